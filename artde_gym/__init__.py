@@ -1,0 +1,10 @@
+"""Gymnasium environments and evaluation for time-delay control: TDE, ATDE, ARTDE and their rivals."""
+
+from importlib.metadata import version
+
+from artde_gym.registration import register_all, register_controller
+
+__version__ = version("artde-gym")
+__all__ = ["__version__", "register_controller"]
+
+register_all()

@@ -1,0 +1,1 @@
+"""References to follow: pure functions of time, without an engine."""

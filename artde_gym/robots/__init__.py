@@ -1,0 +1,1 @@
+"""Robots as data, and the rigid-body algebra over them."""

@@ -1,0 +1,240 @@
+"""Rigid-body algebra of a `RobotSpec` in plain NumPy, batched over leading axes.
+
+A floating-base tree with generalised velocity v = [v_base; w_base; qd], all base quantities in world axes at the base
+link's origin:
+
+    M(q) dv/dt + h(q, v) = [wrench on the base; tau]
+
+Every sum runs over the moving links b with Jacobians J_v,b of the centre of mass and J_w,b of the rotation:
+
+    M   = sum_b  m_b J_v^T J_v + J_w^T I_b J_w
+    tau = sum_b  J_v^T m_b (a_b + g z) + J_w^T (I_b alpha_b + w_b x I_b w_b)
+
+the second one as Newton-Euler sums over what each joint carries. Rotor links follow their gear, so that `n` counts
+independent joints only. Source: Featherstone, Rigid Body Dynamics Algorithms (2008), chapters 2 and 5; the form with
+explicit Jacobians is Siciliano et al., Robotics (2009), section 7.2.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from artde_gym.arrays import Array
+from artde_gym.errors import RobotError
+from artde_gym.robots.spec import RobotSpec
+
+GRAVITY = 9.81  # m/s^2
+
+
+class Frames(NamedTuple):
+    """Where the moving links are, in world axes with the base origin at zero.
+
+    `rot` (..., b, 3, 3) turns link coordinates into world ones, `origin` and `com` are (..., b, 3), `axis`
+    (..., b - 1, 3) holds the joint axes of all links but the base.
+    """
+
+    rot: Array
+    origin: Array
+    com: Array
+    axis: Array
+
+
+class RigidBodyTree:
+    """Kinematics and dynamics of one robot; `joints` names the independent joints in the order of `q`."""
+
+    def __init__(self, spec: RobotSpec) -> None:
+        links = spec.merged().links
+        self._index = {link.name: b for b, link in enumerate(links)}
+        self._mass = np.array([link.mass for link in links])
+        self._com = np.array([link.com for link in links])
+        self._inertia = np.array([np.diag(link.inertia) for link in links])
+        moving = links[1:]
+        self._parent = [0] + [self._index[str(link.parent)] for link in moving]
+        self._offset = np.array([link.origin for link in moving]).reshape(-1, 3)
+        self._axis = np.array([link.axis for link in moving], dtype=np.float64).reshape(-1, 3)
+        self._supports = np.zeros((len(links), len(moving)))  # [b, j]: joint j moves link b
+        for b in range(1, len(links)):
+            self._supports[b] = self._supports[self._parent[b]]
+            self._supports[b, b - 1] = 1.0
+
+        rotors = {gear.rotor: gear for gear in spec.gears}
+        self.joints = tuple(link.name for link in moving if link.name not in rotors)
+        self._transmission = np.zeros((len(moving), len(self.joints)))  # tree joint rates = S qd
+        for row, link in enumerate(moving):
+            gear = rotors.get(link.name)
+            column = self.joints.index(gear.driven if gear else link.name)
+            self._transmission[row, column] = gear.ratio if gear else 1.0
+        self._armature = np.zeros(len(self.joints))
+        for name, armature in zip(spec.actuated, spec.armature, strict=True):
+            self._armature[self.joints.index(name)] = armature
+        self.mass = float(self._mass.sum())
+
+    @property
+    def n(self) -> int:
+        """Number of independent joints."""
+        return len(self.joints)
+
+    def frames(self, q: Array, rot_base_to_world: Array | None = None) -> Frames:
+        """Forward kinematics of joint angles `q` (..., n) (rad)."""
+        angles = q @ self._transmission.T
+        bodies = len(self._mass)
+        rot = np.empty((*q.shape[:-1], bodies, 3, 3))
+        origin = np.zeros((*q.shape[:-1], bodies, 3))
+        rot[..., 0, :, :] = np.eye(3) if rot_base_to_world is None else rot_base_to_world
+        turn = _rotations(self._axis, angles)
+        for b in range(1, bodies):
+            parent = self._parent[b]
+            origin[..., b, :] = origin[..., parent, :] + rot[..., parent, :, :] @ self._offset[b - 1]
+            rot[..., b, :, :] = rot[..., parent, :, :] @ turn[..., b - 1, :, :]
+        com = origin + (rot @ self._com[..., None])[..., 0]
+        axis = (rot[..., 1:, :, :] @ self._axis[..., None])[..., 0]
+        return Frames(rot, origin, com, axis)
+
+    def center_of_mass(self, q: Array, rot_base_to_world: Array | None = None) -> Array:
+        """Whole-body centre of mass relative to the base origin, (..., 3) (m)."""
+        com = self.frames(q, rot_base_to_world).com
+        return np.einsum("b,...bi->...i", self._mass, com) / self.mass
+
+    def mass_matrix(self, q: Array, rot_base_to_world: Array | None = None) -> Array:
+        """M(q), (..., 6 + n, 6 + n)."""
+        frames = self.frames(q, rot_base_to_world)
+        linear, angular = self._jacobians(frames, frames.com, self._supports)
+        inertia = frames.rot @ self._inertia @ np.swapaxes(frames.rot, -1, -2)
+        tree = np.einsum("b,...bik,...bil->...kl", self._mass, linear, linear)
+        tree += np.einsum("...bik,...bij,...bjl->...kl", angular, inertia, angular)
+        reduced = self._reduction.T @ tree @ self._reduction
+        reduced[..., 6:, 6:] += np.diag(self._armature)
+        return reduced
+
+    def inverse_dynamics(
+        self,
+        q: Array,
+        qd: Array,
+        qdd: Array,
+        base_velocity: Array | None = None,
+        base_acceleration: Array | None = None,
+        rot_base_to_world: Array | None = None,
+    ) -> Array:
+        """Generalised force that produces a motion, (..., 6 + n): [force, moment on the base; joint torques].
+
+        `base_velocity` and `base_acceleration` are (..., 6), [linear; angular], the linear acceleration being that of
+        the base origin (not the spatial one). Zero where left out.
+        """
+        frames = self.frames(q, rot_base_to_world)
+        omega, alpha, accel = self._accelerations(frames, qd, qdd, base_velocity, base_acceleration)
+        arm = frames.com - frames.origin
+        accel_com = accel + _cross(alpha, arm) + _cross(omega, _cross(omega, arm))
+        accel_com[..., 2] += GRAVITY
+        force = self._mass[:, None] * accel_com
+        inertia = frames.rot @ self._inertia @ np.swapaxes(frames.rot, -1, -2)
+        moment = (inertia @ alpha[..., None])[..., 0] + _cross(omega, (inertia @ omega[..., None])[..., 0])
+        moment += _cross(frames.com, force)  # about the base origin
+        # what each joint carries: the sum over the links that it moves
+        force_carried = np.einsum("bj,...bi->...ji", self._supports, force)
+        moment_carried = np.einsum("bj,...bi->...ji", self._supports, moment)
+        moment_carried -= _cross(frames.origin[..., 1:, :], force_carried)
+        torque = np.einsum("...ji,...ji->...j", frames.axis, moment_carried) @ self._transmission
+        return np.concatenate([force.sum(axis=-2), moment.sum(axis=-2), torque + self._armature * qdd], axis=-1)
+
+    def jacobian(self, link: str, q: Array, rot_base_to_world: Array | None = None) -> Array:
+        """J (..., 6, 6 + n) of the velocity [linear; angular] of the origin of `link`."""
+        frames = self.frames(q, rot_base_to_world)
+        body = self._body(link)
+        linear, angular = self._jacobians(frames, frames.origin[..., [body], :], self._supports[[body]])
+        return np.concatenate([linear, angular], axis=-2)[..., 0, :, :] @ self._reduction
+
+    def bias_acceleration(
+        self, link: str, q: Array, qd: Array, base_velocity: Array, rot_base_to_world: Array | None = None
+    ) -> Array:
+        """dJ/dt v, (..., 6): the acceleration of the origin of `link` while all of dv/dt is zero."""
+        frames = self.frames(q, rot_base_to_world)
+        _, alpha, accel = self._accelerations(frames, qd, np.zeros_like(qd), base_velocity, None)
+        body = self._body(link)
+        return np.concatenate([accel[..., body, :], alpha[..., body, :]], axis=-1)
+
+    def position(self, link: str, q: Array, rot_base_to_world: Array | None = None) -> Array:
+        """Origin of `link` relative to the base origin, (..., 3) (m)."""
+        return self.frames(q, rot_base_to_world).origin[..., self._body(link), :]
+
+    def rotation(self, link: str, q: Array) -> Array:
+        """Orientation of `link` in base axes, (..., 3, 3)."""
+        return self.frames(q).rot[..., self._body(link), :, :]
+
+    @property
+    def _reduction(self) -> Array:
+        size = 6 + self._transmission.shape[0]
+        reduction = np.zeros((size, 6 + self.n))
+        reduction[:6, :6] = np.eye(6)
+        reduction[6:, 6:] = self._transmission
+        return reduction
+
+    def _body(self, link: str) -> int:
+        if link not in self._index:
+            raise RobotError("link", link, ", ".join(self._index))
+        return self._index[link]
+
+    def _jacobians(self, frames: Frames, point: Array, supports: Array) -> tuple[Array, Array]:
+        """Linear and angular Jacobian of one `point` (..., b, 3) on each of the links with `supports` (b, joints)."""
+        shape = (*point.shape[:-1], 3, 6 + supports.shape[1])
+        linear, angular = np.zeros(shape), np.zeros(shape)
+        linear[..., :3] = angular[..., 3:6] = np.eye(3)
+        linear[..., 3:6] = -_skew(point)
+        arm = point[..., :, None, :] - frames.origin[..., None, 1:, :]  # (..., b, j, 3)
+        moved = _cross(frames.axis[..., None, :, :], arm) * supports[..., None]
+        linear[..., 6:] = np.swapaxes(moved, -1, -2)
+        angular[..., 6:] = np.swapaxes(frames.axis[..., None, :, :] * supports[..., None], -1, -2)
+        return linear, angular
+
+    def _accelerations(
+        self, frames: Frames, qd: Array, qdd: Array, base_velocity: Array | None, base_acceleration: Array | None
+    ) -> tuple[Array, Array, Array]:
+        """Angular velocity, angular acceleration and acceleration of the origin of each link, (..., b, 3)."""
+        rate, rate_dot = qd @ self._transmission.T, qdd @ self._transmission.T
+        omega, alpha, accel = (np.zeros_like(frames.com) for _ in range(3))
+        if base_velocity is not None:
+            omega[..., 0, :] = base_velocity[..., 3:]
+        if base_acceleration is not None:
+            accel[..., 0, :], alpha[..., 0, :] = base_acceleration[..., :3], base_acceleration[..., 3:]
+        for b in range(1, len(self._mass)):
+            parent, spin = self._parent[b], frames.axis[..., b - 1, :] * rate[..., b - 1, None]
+            w, dw = omega[..., parent, :], alpha[..., parent, :]
+            arm = frames.origin[..., b, :] - frames.origin[..., parent, :]
+            omega[..., b, :] = w + spin
+            alpha[..., b, :] = dw + frames.axis[..., b - 1, :] * rate_dot[..., b - 1, None] + _cross(w, spin)
+            accel[..., b, :] = accel[..., parent, :] + _cross(dw, arm) + _cross(w, _cross(w, arm))
+        return omega, alpha, accel
+
+
+def joint_space_inertia(mass_matrix: Array) -> Array:
+    """Inertia that the joints of a free-floating robot feel: the Schur complement of M over its base.
+
+    M_jj - M_jb M_bb^-1 M_bj, (..., n, n); its inverse is the joint block of M^-1, so that qdd = inertia^-1 tau + ....
+    """
+    base, cross = mass_matrix[..., :6, :6], mass_matrix[..., :6, 6:]
+    return mass_matrix[..., 6:, 6:] - np.swapaxes(cross, -1, -2) @ np.linalg.solve(base, cross)
+
+
+def _rotations(axis: Array, angle: Array) -> Array:
+    """Rodrigues: R = 1 + sin(a) [axis]x + (1 - cos(a)) [axis]x^2, (..., j, 3, 3)."""
+    cross = _skew(axis)
+    sine, cosine = np.sin(angle)[..., None, None], np.cos(angle)[..., None, None]
+    return np.eye(3) + sine * cross + (1 - cosine) * (cross @ cross)
+
+
+def _skew(v: Array) -> Array:
+    """[v]x, with [v]x u = v x u."""
+    out = np.zeros((*v.shape, 3))
+    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
+    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
+    return out
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """a x b; np.cross does the same, several times slower on short vectors."""
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    out[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
+    out[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
+    out[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return out
