@@ -1,0 +1,6 @@
+"""What happens to a robot beyond its own dynamics, as data: one JSON-able grammar for all environments."""
+
+from artde_gym.disturbances.grammar import Disturbances
+from artde_gym.disturbances.kinds import KINDS
+
+__all__ = ["KINDS", "Disturbances"]

@@ -1,0 +1,201 @@
+"""Reading, checking and drawing disturbances.
+
+    {"payload": 1.3,
+     "push": [{"body": "chest", "magnitude": {"uniform": [5, 40]}, "direction": [1, 0, 0], "start": 28.0}],
+     "friction": {"coefficient": {"choice": [0.7, 0.8, 0.9]}}}
+
+In place of any number stands a number or a distribution: {"uniform": [low, high]}, {"normal": [mean, std]} (drawn
+again until it lies in the allowed range) or {"choice": [...]}, whose items are vectors where the parameter is one.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import sys
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from artde_gym.disturbances.kinds import KINDS, Kind, Parameter
+from artde_gym.errors import DisturbanceError, among
+
+DISTRIBUTIONS = ("uniform", "normal", "choice")
+NORMAL_DRAWS = 1000  # then the mean, which is in range: a normal much wider than its range is no endless loop
+
+
+@dataclasses.dataclass(frozen=True)
+class Disturbances:
+    """Checked disturbances of one robot; build them with `parse`.
+
+    `entries` holds (kind, {parameter: value or distribution}) with all defaults filled in, in the order of `KINDS`,
+    so that the same seed draws the same values however the user ordered the keys.
+    """
+
+    entries: tuple[tuple[str, Mapping[str, Any]], ...] = ()
+
+    @classmethod
+    def parse(cls, given: Mapping[str, Any] | None, sites: Collection[str]) -> Disturbances:
+        """Check `given` against the grammar; `sites` are the places that this robot can be pushed at.
+
+        Raises:
+            DisturbanceError: for an unknown kind, key or site, a wrong type, a value out of range or not finite.
+        """
+        if given is None:
+            return cls()
+        if not isinstance(given, Mapping):
+            raise DisturbanceError("disturbances", given, "a mapping of kinds to their parameters")
+        for name in given:
+            if name not in KINDS:
+                raise DisturbanceError("disturbances", name, among(name, KINDS))
+        entries: list[tuple[str, Mapping[str, Any]]] = []
+        for name, kind in KINDS.items():
+            if name in given:
+                for path, entry in _entries(kind, given[name]):
+                    entries.append((name, _parse_entry(kind, entry, path, sites)))
+        return cls(tuple(entries))
+
+    def draw(self, rng: np.random.Generator) -> dict[str, Any]:
+        """Realised values, in the same grammar: `Disturbances.parse` reads them back."""
+        realised: dict[str, Any] = {}
+        for name, entry in self.entries:
+            values = {
+                parameter.name: _draw(entry[parameter.name], parameter, rng) for parameter in KINDS[name].parameters
+            }
+            if KINDS[name].repeated:
+                realised.setdefault(name, []).append(values)
+            else:
+                realised[name] = values
+        return realised
+
+    def to_json(self) -> str:
+        """The disturbances as JSON that `parse` reads back."""
+        grouped: dict[str, Any] = {}
+        for name, entry in self.entries:
+            if KINDS[name].repeated:
+                grouped.setdefault(name, []).append(dict(entry))
+            else:
+                grouped[name] = dict(entry)
+        return json.dumps(grouped)
+
+
+def _entries(kind: Kind, given: Any) -> list[tuple[str, Any]]:
+    if not kind.repeated:
+        return [(kind.name, given)]
+    if isinstance(given, Mapping):
+        return [(f"{kind.name}[0]", given)]
+    if isinstance(given, Sequence) and not isinstance(given, str):
+        return [(f"{kind.name}[{i}]", entry) for i, entry in enumerate(given)]
+    raise DisturbanceError(kind.name, given, "a list of mappings")
+
+
+def _parse_entry(kind: Kind, given: Any, path: str, sites: Collection[str]) -> dict[str, Any]:
+    names = {parameter.name: parameter for parameter in kind.parameters}
+    if kind.scalar is not None and (_is_number(given) or _is_distribution(given)):
+        given = {kind.scalar: given}
+    if not isinstance(given, Mapping):
+        raise DisturbanceError(path, given, f"a mapping with keys among {', '.join(names)}")
+    for key in given:
+        if key not in names:
+            raise DisturbanceError(f"{path} key", key, among(key, names))
+    entry = {}
+    for name, parameter in names.items():
+        field = f"{path}.{name}"
+        if name not in given and parameter.default is None:
+            raise DisturbanceError(field, None, f"{_range(parameter)} (it has no default)")
+        value = given.get(name, parameter.default)
+        entry[name] = _word(value, field, sites) if parameter.size == 0 else _check(value, parameter, field)
+    return entry
+
+
+def _word(value: Any, field: str, allowed: Collection[str]) -> str:
+    if not (isinstance(value, str) and value in allowed):
+        raise DisturbanceError(field, value, among(value, allowed))
+    return value
+
+
+def _check(value: Any, parameter: Parameter, field: str) -> Any:
+    """The value with plain floats in place of whatever number types came in."""
+    if _is_distribution(value):
+        ((kind, arguments),) = value.items()
+        return {kind: _check_distribution(kind, arguments, parameter, field)}
+    if parameter.size > 1:
+        if not (_is_list(value) and len(value) == parameter.size):
+            raise DisturbanceError(field, value, f"{parameter.size} numbers, or {{'choice': [...]}} of such vectors")
+        component = dataclasses.replace(parameter, size=1)
+        checked = [_check(item, component, f"{field}[{i}]") for i, item in enumerate(value)]
+        if parameter.nonzero and not any(_may_be_nonzero(item) for item in checked):
+            raise DisturbanceError(field, value, "any vector but zero")
+        return checked
+    if not (_is_number(value) and parameter.low <= value <= parameter.high):  # nan fails both comparisons
+        raise DisturbanceError(field, value, _range(parameter))
+    return float(value)
+
+
+def _check_distribution(kind: str, arguments: Any, parameter: Parameter, field: str) -> list[Any]:
+    if kind == "choice":
+        if not (_is_list(arguments) and len(arguments) > 0):
+            raise DisturbanceError(f"{field}.choice", arguments, "a list with at least one item")
+        items = list(enumerate(arguments))
+        for i, item in items:
+            if _is_distribution(item):
+                raise DisturbanceError(f"{field}.choice[{i}]", item, "a plain value, not a distribution")
+        return [_check(item, parameter, f"{field}.choice[{i}]") for i, item in items]
+    if parameter.size > 1:
+        raise DisturbanceError(field, {kind: arguments}, "a list of components, each a number or a distribution")
+    if not (_is_list(arguments) and len(arguments) == 2):
+        raise DisturbanceError(f"{field}.{kind}", arguments, "two numbers")
+    first = _check(arguments[0], parameter, f"{field}.{kind}[0]")
+    if kind == "uniform":
+        second = _check(arguments[1], parameter, f"{field}.uniform[1]")
+        if first > second:
+            raise DisturbanceError(f"{field}.uniform", arguments, "two numbers, the lower one first")
+    else:
+        second = arguments[1]
+        if not (_is_number(second) and 0 <= second <= sys.float_info.max):
+            raise DisturbanceError(f"{field}.normal[1]", second, "a finite standard deviation >= 0")
+    return [first, float(second)]
+
+
+def _draw(value: Any, parameter: Parameter, rng: np.random.Generator) -> Any:
+    if isinstance(value, list):
+        for _ in range(NORMAL_DRAWS):
+            drawn = [_draw(item, parameter, rng) for item in value]
+            if any(drawn) or not parameter.nonzero:
+                return drawn
+        return [1.0, *[0.0] * (parameter.size - 1)]  # next to no chance of another vector that is allowed
+    if not isinstance(value, dict):
+        return value
+    ((kind, arguments),) = value.items()
+    if kind == "choice":
+        return _draw(arguments[int(rng.integers(len(arguments)))], parameter, rng)  # a vector may hold distributions
+    if kind == "uniform":
+        return float(rng.uniform(*arguments))
+    for _ in range(NORMAL_DRAWS):
+        drawn = float(rng.normal(*arguments))
+        if parameter.low <= drawn <= parameter.high:
+            return drawn
+    return arguments[0]
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+
+
+def _is_list(value: Any) -> bool:
+    return isinstance(value, (list, tuple)) or (isinstance(value, np.ndarray) and value.ndim > 0)
+
+
+def _is_distribution(value: Any) -> bool:
+    return isinstance(value, Mapping) and len(value) == 1 and next(iter(value)) in DISTRIBUTIONS
+
+
+def _may_be_nonzero(component: Any) -> bool:
+    """Whether a checked number or distribution can give anything but zero."""
+    return any(next(iter(component.values()))) if isinstance(component, dict) else component != 0
+
+
+def _range(parameter: Parameter) -> str:
+    unit = "" if parameter.unit in ("", "1") else f" {parameter.unit}"
+    return f"{parameter.low:g} to {parameter.high:g}{unit}, or a distribution of such values"

@@ -1,0 +1,1 @@
+"""Gymnasium environments; make them with `gymnasium.make` after `import artde_gym`."""

@@ -1,0 +1,344 @@
+"""`BipedWalk-Payload-v0`: Ojas walks along a given pattern under joint torques."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from artde_gym.arrays import Array
+from artde_gym.disturbances import Disturbances
+from artde_gym.errors import ActionError, OptionError
+from artde_gym.layout import Field, Layout
+from artde_gym.references.walking import WalkingPattern, hip_height_above_ankle, walking_pattern
+from artde_gym.robots import ojas as robot
+from artde_gym.robots.ojas import ActuatorInertia, ojas
+from artde_gym.robots.support import Supported
+from artde_gym.sim.engine import Camera, Engine, State
+from artde_gym.sim.factory import EngineName, make_engine
+
+TIME_STEP = 0.001  # s, of the physics
+FRICTION = 0.8  # of feet and ground
+FALL_TILT_DEG = 35.0
+FALL_HEIGHT = 0.25  # m, of the base; the hips walk at 0.395 m or higher
+SETTLE = 0.3  # s, before the first step, for feet and payload to come to rest
+SETTLE_STIFFNESS = 420.0  # Nm/rad: what TDE at 1 ms has, Kd m_bar / L
+SETTLE_DAMPING = 10.0  # Nm s/rad
+CONTACT_FORCE = 1.0  # N, from which on a foot counts as loaded
+MAX_SPEED = 200.0  # rad/s, bound of observed joint speeds
+
+N_JOINTS = 12
+
+OBSERVATION = Layout(
+    (
+        Field("q", N_JOINTS, "rad", -2 * math.pi, 2 * math.pi, "leg joint angles, left q1..q6 then right q1..q6"),
+        Field("qd", N_JOINTS, "rad/s", -MAX_SPEED, MAX_SPEED, "leg joint velocities"),
+        Field("q_ref", N_JOINTS, "rad", -math.pi, math.pi, "reference angles"),
+        Field("qd_ref", N_JOINTS, "rad/s", -50.0, 50.0, "reference velocities"),
+        Field("qdd_ref", N_JOINTS, "rad/s^2", -1000.0, 1000.0, "reference accelerations"),
+        Field(
+            "tau_applied",
+            N_JOINTS,
+            "Nm",
+            -robot.TORQUE_LIMIT,
+            robot.TORQUE_LIMIT,
+            "torques really applied over the last control period",
+        ),
+        Field("base_height", 1, "m", -1.0, 2.0, "base origin (middle of the hip line) above the ground"),
+        Field("tilt", 2, "rad", -math.pi, math.pi, "roll about x and pitch about y of the base"),
+        Field("base_velocity", 3, "m/s", -100.0, 100.0, "of the base origin, world axes"),
+        Field("base_angular_velocity", 3, "rad/s", -MAX_SPEED, MAX_SPEED, "of the base, world axes"),
+        Field("contact", 2, "1", 0.0, 1.0, "1 where the left, right foot carries more than 1 N"),
+        Field("load_left_ref", 1, "1", 0.0, 1.0, "share of the weight that the pattern puts on the left foot"),
+        Field("phase", 1, "1", 0.0, 1.0, "progress within a stride of two steps; 0 while standing"),
+    )
+)
+ACTION = Layout(
+    (Field("tau", N_JOINTS, "Nm", -robot.TORQUE_LIMIT, robot.TORQUE_LIMIT, "leg joint torques, left then right"),)
+)
+_Q, _Q_REF = OBSERVATION["q"], OBSERVATION["q_ref"]
+
+REWARD_SCALES: dict[str, float] = {
+    "alive": 1.0,
+    "tracking": 2.0,
+    "upright": 0.5,
+    "effort": -0.05,
+    "smoothness": -0.05,
+}
+"""The reward of a control period L is L times the sum of these scales times their terms (see `BipedWalkPayloadEnv`)."""
+
+
+class BipedWalkPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
+    """Ojas, a 20-joint humanoid of 8.986 kg and 0.94 m, walks with a payload on its torso.
+
+    ## Description
+    A walking pattern (stand 2 s, walk, stop) gives a reference for the twelve leg joints; the policy gives their
+    torques. What the policy does not see: payload, pushes, friction. After section 2.5 of Dantu, *Adaptive Artificial
+    Time Delay Control for Robotic Systems* (2023); the robot's mass distribution and the pattern are ours.
+
+    ## Action
+    `Box(-40, 40, (12,), float64)`, joint torques in Nm, left leg then right leg, each q1..q6 = hip yaw, hip roll, hip
+    pitch, knee, ankle pitch, ankle roll. Held for one control period; clipped to the bounds. Use Gymnasium's
+    `RescaleAction` for [-1, 1].
+
+    ## Observation
+    {observation}
+
+    `tau_applied` is what really acted, after saturation: the time-delay estimate needs just that.
+
+    ## Reward
+    Over a control period L, L times the sum of scale x term; each term is in `info["reward_terms"]`:
+
+    | term | scale | value |
+    |---|---|---|
+    | `alive` | 1 | 1 |
+    | `tracking` | 2 | exp(-|e|^2 / 0.02), e = q_ref - q in rad |
+    | `upright` | 0.5 | exp(-tilt^2 / 0.05) |
+    | `effort` | -0.05 | mean of (tau / 40 Nm)^2 |
+    | `smoothness` | -0.05 | mean of (change of tau / 40 Nm)^2 |
+
+    A walk of 58 s without an error earns a little under 203.
+
+    ## Start
+    The robot stands on both feet in the pattern's first pose, at rest, in balance with its payload.
+
+    ## End
+    *Terminated* when it has fallen: tilt above 35 degrees (`info["fall_reason"] == "tilt"`) or base below 0.25 m
+    (`"height"`). *Truncated* at the end of the walk.
+
+    ## Arguments
+    | name | default | allowed | meaning |
+    |---|---|---|---|
+    | `disturbances` | payload of 1.3 kg | see `artde_gym.disturbances` | what happens besides; `{{}}` for nothing |
+    | `control_period` | 0.001 | whole multiples of 0.001 s up to 0.05 | time between two actions, L |
+    | `actuator_inertia` | "rotor" | "rotor", "lumped", "none" | geared rotors, discs (3x faster), nothing |
+    | `arms` | "fixed" | "fixed", "revolute" | all 20 joints with "revolute": arms held by motors |
+    | `speed` | 0.1 | 0 to 0.25 m/s | walking speed |
+    | `step_duration` | 1.0 | 0.6 to 2 s | time of one step |
+    | `duration` | 58.0 | from 0.1 s | length of the walk |
+    | `engine` | "bullet" | "bullet" | physics engine |
+
+    `reset(options={{"disturbances": ..., "scenario": "S2"}})` replaces the disturbances of this and the following
+    episodes, by a mapping or by those of a named scenario.
+
+    ## Info
+    `time_s`, `reward_terms`; at reset `disturbances` (realised values, as the grammar writes them); after a fall
+    `fall_reason`.
+
+    ## Versions
+    * v0: first version.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}
+
+    observation_layout = OBSERVATION
+    action_layout = ACTION
+    robot_name = "ojas"
+    reported_axes: ClassVar[dict[str, int]] = {f"q{i + 1}": N_JOINTS // 2 + i for i in range(N_JOINTS // 2)}
+    """Columns of q that tables show: the right leg, as in the thesis."""
+
+    def __init__(
+        self,
+        *,
+        disturbances: Mapping[str, Any] | None = None,
+        control_period: float = 0.001,
+        actuator_inertia: ActuatorInertia = "rotor",
+        arms: Literal["fixed", "revolute"] = "fixed",
+        speed: float = 0.1,
+        step_duration: float = 1.0,
+        duration: float = 58.0,
+        engine: EngineName = "bullet",
+        render_mode: Literal["rgb_array"] | None = None,
+    ) -> None:
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise OptionError("render_mode", render_mode, "None, 'rgb_array'")
+        self.render_mode = render_mode
+        self.nominal_robot = ojas(actuator_inertia)
+        model = ojas(actuator_inertia, arms=arms)
+        self._sites = [name for name, _, _ in model.sites]
+        self._disturbances = self._parse({"payload": 1.3} if disturbances is None else disturbances)
+        self._substeps = _substeps(control_period)
+        self.control_period = self._substeps * TIME_STEP
+        self._engine: Engine = make_engine(engine, model, TIME_STEP)
+        self.pattern = walking_pattern(speed, step_duration, duration, TIME_STEP)
+        self._plan = _plan(self.pattern, self._substeps)
+        self._last = len(self._plan) - 1
+        self.observation_space = OBSERVATION.box()
+        self.action_space = ACTION.box()
+        hip_height = robot.ANKLE_HEIGHT + hip_height_above_ankle(speed, step_duration)
+        self._engine.set_friction(FRICTION)
+        self._engine.place((float(self.pattern.base[0, 0]), 0.0, hip_height), self.pattern.q[0])
+        start, rest = self.pattern.q[0], np.zeros(N_JOINTS)
+        self._stand = Supported(self.nominal_robot).torque(0.5, start, rest, rest)
+        self._still = self._settle()
+        self._settled = self._engine.snapshot()
+        self._k = self._last  # no step before the first reset
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
+        """Start a walk; see the class for the options.
+
+        Raises:
+            OptionError: for an unknown option.
+            DisturbanceError: for a malformed disturbance.
+        """
+        super().reset(seed=seed)
+        self._read_options(options or {})
+        realised = self._disturbances.draw(self.np_random)
+        self._engine.restore(self._settled)
+        self._engine.set_friction(realised.get("friction", {}).get("coefficient", FRICTION))
+        self._pushes = [_Push(entry) for entry in realised.get("push", ())]
+        self._tau = self._still
+        if "payload" in realised:
+            payload = realised["payload"]
+            self._engine.attach_payload(payload["mass"], tuple(payload["position"]))
+            self._tau = self._settle()
+        self._k = 0
+        self._state = self._engine.read()
+        return self._observe(), {"time_s": 0.0, "disturbances": realised}
+
+    def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+        """Apply joint torques for one control period.
+
+        Raises:
+            ActionError: for a wrong shape or a value that is not finite.
+            gymnasium.error.ResetNeeded: after the end of the walk, or before the first reset.
+        """
+        if self._k >= self._last:
+            raise gym.error.ResetNeeded("the walk is over or has not begun: call reset()")
+        action = np.asarray(action, dtype=np.float64)
+        if action.shape != (N_JOINTS,):
+            raise ActionError("shape of the action", action.shape, f"({N_JOINTS},)")
+        if not math.isfinite(action.dot(action)):
+            raise ActionError("action", action.tolist(), "finite torques (Nm)")
+        previous, self._tau = self._tau, np.minimum(np.maximum(action, -robot.TORQUE_LIMIT), robot.TORQUE_LIMIT)
+        for substep in range(self._k * self._substeps, (self._k + 1) * self._substeps):
+            for push in self._pushes:
+                if push.first <= substep < push.end:
+                    self._engine.push(push.site, push.force)
+            self._engine.step(self._tau)
+        self._k += 1
+        self._state = self._engine.read()
+        observation = self._observe()
+        terms = self._reward_terms(observation, previous)
+        reward = self.control_period * sum([REWARD_SCALES[name] * value for name, value in terms.items()])
+        info: dict[str, Any] = {"time_s": self._k * self.control_period, "reward_terms": terms}
+        fall = self._fall()
+        if fall:
+            info["fall_reason"] = fall
+        return observation, reward, fall is not None, self._k >= self._last, info
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """A picture of 640 x 480 from a camera that walks along; None without a render mode."""
+        if self.render_mode is None:
+            return None
+        x, y, _ = self._engine.read().position
+        return self._engine.render(Camera((x, y, 0.42)))
+
+    def close(self) -> None:
+        self._engine.close()
+
+    def _parse(self, disturbances: Mapping[str, Any]) -> Disturbances:
+        return Disturbances.parse(disturbances, self._sites)
+
+    def _read_options(self, options: Mapping[str, Any]) -> None:
+        for key in options:
+            if key not in ("disturbances", "scenario"):
+                raise OptionError("reset option", key, "'disturbances', 'scenario'")
+        if options.get("scenario") is not None:
+            from artde_gym.evaluation.scenarios import scenario  # scenarios name environments, so not at the top
+
+            entry = scenario(options["scenario"])
+            for name, value in entry.kwargs.items():
+                if getattr(self, name) != value:
+                    raise OptionError(f"{name} of this environment", getattr(self, name), f"{value!r} in {entry.name}")
+            self._disturbances = self._parse(entry.disturbances)
+        if options.get("disturbances") is not None:
+            self._disturbances = self._parse(options["disturbances"])
+
+    def _settle(self) -> Array:
+        """Stand still under springs on the joints; returns the torques in the end.
+
+        Springs share the load of the two legs evenly. A rigid hold would not: the legs and the ground are a closed
+        chain, in which any start error turns into antagonistic torques of several Nm.
+        """
+        q0, tau = self.pattern.q[0], self._stand
+        for _ in range(round(SETTLE / TIME_STEP)):
+            state = self._engine.read()
+            tau = self._stand + SETTLE_STIFFNESS * (q0 - state.q) - SETTLE_DAMPING * state.qd
+            self._engine.step(tau)
+        return np.clip(tau, -robot.TORQUE_LIMIT, robot.TORQUE_LIMIT)
+
+    def _observe(self) -> Array:
+        state, plan = self._state, self._plan[self._k]
+        left, right = self._engine.foot_loads()
+        self._tilt = roll, pitch = _roll_pitch(state)
+        contact = (left > CONTACT_FORCE, right > CONTACT_FORCE)
+        base = (state.position[2], roll, pitch, *state.velocity, *state.angular_velocity, *contact)
+        return np.concatenate([state.q, state.qd, plan[:-2], self._tau, base, plan[-2:]])
+
+    def _reward_terms(self, observation: Array, previous: Array) -> dict[str, float]:
+        error = observation[_Q_REF] - observation[_Q]
+        change = self._tau - previous
+        roll, pitch = self._tilt
+        return {
+            "alive": 1.0,
+            "tracking": math.exp(-float(error.dot(error)) / 0.02),
+            "upright": math.exp(-(roll * roll + pitch * pitch) / 0.05),
+            "effort": float(self._tau.dot(self._tau)) * _EFFORT_SCALE,
+            "smoothness": float(change.dot(change)) * _EFFORT_SCALE,
+        }
+
+    def _fall(self) -> str | None:
+        x, y = self._state.quat_xyzw[:2]
+        up = 1.0 - 2.0 * (x * x + y * y)  # the world's z component of the base's z axis
+        if not up >= _COS_FALL:  # a state that is no number any more counts as fallen
+            return "tilt"
+        if self._state.position[2] < FALL_HEIGHT:
+            return "height"
+        return None
+
+
+BipedWalkPayloadEnv.__doc__ = str(BipedWalkPayloadEnv.__doc__).format(observation=OBSERVATION.table())
+
+_COS_FALL = math.cos(math.radians(FALL_TILT_DEG))
+_EFFORT_SCALE = 1.0 / (N_JOINTS * robot.TORQUE_LIMIT**2)
+
+
+class _Push:
+    """A push in physics steps: acts from `first` up to, not including, `end`."""
+
+    def __init__(self, entry: Mapping[str, Any]) -> None:
+        self.site: str = entry["body"]
+        direction = np.asarray(entry["direction"])
+        direction = direction / np.abs(direction).max()  # so that the squares of tiny components do not vanish
+        x, y, z = (entry["magnitude"] * direction / np.linalg.norm(direction)).tolist()
+        self.force = (x, y, z)
+        self.first = round(entry["start"] / TIME_STEP)
+        self.end = self.first + max(1, round(entry["duration"] / TIME_STEP))
+
+
+def _substeps(control_period: float) -> int:
+    allowed = f"whole multiples of {TIME_STEP} s up to 0.05 s"
+    if not (isinstance(control_period, (int, float)) and math.isfinite(control_period)):
+        raise OptionError("control_period", control_period, allowed)
+    substeps = round(control_period / TIME_STEP)
+    if not (1 <= substeps <= 50 and math.isclose(substeps * TIME_STEP, control_period, rel_tol=1e-9)):
+        raise OptionError("control_period", control_period, allowed)
+    return substeps
+
+
+def _plan(pattern: WalkingPattern, substeps: int) -> Array:
+    """What the observation takes from the pattern, one row a control period."""
+    columns = (pattern.q, pattern.qd, pattern.qdd, pattern.load_left[:, None], pattern.phase[:, None])
+    return np.concatenate([column[::substeps] for column in columns], axis=1)
+
+
+def _roll_pitch(state: State) -> tuple[float, float]:
+    x, y, z, w = state.quat_xyzw
+    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
+    return roll, pitch

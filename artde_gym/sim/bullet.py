@@ -1,0 +1,268 @@
+"""The engine protocol on PyBullet.
+
+Bullet's habits that stay in here: it knows no armature, so that rotors become links with gears; the base is read and
+set by its centre-of-mass frame; torque control holds for one step; motors are on until told otherwise; joint speeds are
+clamped at 100 rad/s by default; friction of a pair is the product of both bodies'; the solver stops early at a residual
+that leaves 1 % errors in geared joints; every call needs the client's number, or a second simulation in the process
+corrupts the first.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+import weakref
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pybullet_data
+from numpy.typing import NDArray
+
+from artde_gym.arrays import Array
+from artde_gym.errors import RobotError
+from artde_gym.robots.spec import RobotSpec, Vector
+from artde_gym.robots.urdf import urdf
+from artde_gym.sim.engine import Camera, State
+
+
+@contextlib.contextmanager
+def _silent_stderr() -> Iterator[None]:
+    saved, sink = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(sink, 2)
+        yield
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)
+        os.close(sink)
+
+
+with _silent_stderr():  # PyBullet's C code greets every process with its build time
+    import pybullet as bullet
+
+GEAR_ITERATIONS = 30  # of the constraint solver; gears converge faster than bare joints
+BARE_ITERATIONS = 50
+GEAR_FORCE = 1e6  # N, more than any gear carries
+PAYLOAD_FORCE = 1e5  # N, likewise
+PAYLOAD_RADIUS = 0.08  # m: it shows on either side of the torso
+HOLD_TORQUE = 100.0  # Nm, of the motors that hold joints which nobody actuates
+
+
+class BulletEngine:
+    """One robot on a plane in a Bullet world of its own."""
+
+    def __init__(self, spec: RobotSpec, time_step: float = 0.001) -> None:
+        self.spec = spec = spec.with_rotor_links() if any(spec.armature) else spec
+        self.time_step = time_step
+        self._client = bullet.connect(bullet.DIRECT)
+        if self._client < 0:
+            raise RuntimeError("PyBullet gave no physics client: too many are open in this process")
+        self._finalizer = weakref.finalize(self, _disconnect, self._client)
+        bullet.setTimeStep(time_step, physicsClientId=self._client)
+        bullet.setGravity(0.0, 0.0, -9.81, physicsClientId=self._client)
+        bullet.setPhysicsEngineParameter(
+            numSolverIterations=GEAR_ITERATIONS if spec.gears else BARE_ITERATIONS,
+            solverResidualThreshold=0.0,
+            deterministicOverlappingPairs=1,
+            enableFileCaching=0,
+            physicsClientId=self._client,
+        )
+        self._ground = self._build_ground()
+        self._robot = self._build_robot()
+        self._com = spec.base.com
+        self._payload: tuple[int, int] | None = None  # body, constraint
+
+    def _build_ground(self) -> int:
+        shape = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=self._client)
+        mesh = str(Path(pybullet_data.getDataPath()) / "plane100.obj")
+        visual = bullet.createVisualShape(bullet.GEOM_MESH, fileName=mesh, physicsClientId=self._client)
+        ground = bullet.createMultiBody(0.0, shape, visual, physicsClientId=self._client)
+        texture = bullet.loadTexture(
+            str(Path(pybullet_data.getDataPath()) / "checker_blue.png"), physicsClientId=self._client
+        )
+        bullet.changeVisualShape(ground, -1, textureUniqueId=texture, physicsClientId=self._client)
+        bullet.changeDynamics(ground, -1, lateralFriction=1.0, restitution=0.0, physicsClientId=self._client)
+        return ground
+
+    def _build_robot(self) -> int:
+        client: dict[str, Any] = {"physicsClientId": self._client}
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / f"{self.spec.name}.urdf"
+            file.write_text(urdf(self.spec), encoding="utf-8")
+            robot = bullet.loadURDF(str(file), flags=bullet.URDF_USE_INERTIA_FROM_FILE, **client)
+        count = bullet.getNumJoints(robot, **client)
+        self._links = {bullet.getJointInfo(robot, i, **client)[12].decode(): i for i in range(count)}
+        self._links[self.spec.base.name] = -1
+        self._joints = [self._links[name] for name in self.spec.actuated]
+        self._feet = [self._links[name] for name in self.spec.feet]
+        rotors = {gear.rotor for gear in self.spec.gears}
+        self._held = [
+            self._links[link.name] for link in self.spec.joints if link.name not in (*self.spec.actuated, *rotors)
+        ]
+        for link in range(-1, count):
+            bullet.changeDynamics(
+                robot,
+                link,
+                linearDamping=0.0,
+                angularDamping=0.0,
+                jointDamping=0.0,
+                restitution=0.0,
+                maxJointVelocity=1e4,
+                **client,
+            )
+            bullet.changeDynamics(robot, link, activationState=bullet.ACTIVATION_STATE_DISABLE_SLEEPING, **client)
+        for joint in range(count):
+            bullet.setJointMotorControl2(robot, joint, bullet.VELOCITY_CONTROL, force=0.0, **client)
+        for joint in self._held:
+            bullet.setJointMotorControl2(
+                robot, joint, bullet.POSITION_CONTROL, targetPosition=0.0, force=HOLD_TORQUE, **client
+            )
+        for gear in self.spec.gears:
+            rotor, driven = self._links[gear.rotor], self._links[gear.driven]
+            constraint = bullet.createConstraint(
+                robot, rotor, robot, driven, bullet.JOINT_GEAR, [0, 0, 1], [0, 0, 0], [0, 0, 0], **client
+            )
+            bullet.changeConstraint(constraint, gearRatio=-gear.ratio, maxForce=GEAR_FORCE, erp=0.0, **client)
+        return robot
+
+    def place(self, position: Vector, q: Array) -> None:
+        self._detach_payload()
+        center = np.add(position, self._com).tolist()
+        client: dict[str, Any] = {"physicsClientId": self._client}
+        bullet.resetBasePositionAndOrientation(self._robot, center, [0.0, 0.0, 0.0, 1.0], **client)
+        bullet.resetBaseVelocity(self._robot, [0.0] * 3, [0.0] * 3, **client)
+        angle = dict(zip(self.spec.actuated, q.tolist(), strict=True))
+        angle.update({gear.rotor: gear.ratio * angle[gear.driven] for gear in self.spec.gears})
+        for name, joint in self._links.items():
+            if joint >= 0:
+                bullet.resetJointState(self._robot, joint, angle.get(name, 0.0), 0.0, **client)
+
+    def snapshot(self) -> int:
+        return bullet.saveState(physicsClientId=self._client)
+
+    def restore(self, snapshot: int) -> None:
+        self._detach_payload()  # Bullet restores only a world with the same bodies
+        bullet.restoreState(snapshot, physicsClientId=self._client)
+
+    def read(self) -> State:
+        client = self._client
+        states = bullet.getJointStates(self._robot, self._joints, physicsClientId=client)
+        center, quat = bullet.getBasePositionAndOrientation(self._robot, physicsClientId=client)
+        velocity, spin = bullet.getBaseVelocity(self._robot, physicsClientId=client)
+        ax, ay, az = self._arm(quat)
+        wx, wy, wz = spin
+        return State(
+            np.array([state[0] for state in states]),
+            np.array([state[1] for state in states]),
+            (center[0] - ax, center[1] - ay, center[2] - az),
+            quat,
+            # v_origin = v_com - w x arm
+            (velocity[0] - wy * az + wz * ay, velocity[1] - wz * ax + wx * az, velocity[2] - wx * ay + wy * ax),
+            spin,
+        )
+
+    def step(self, tau: Array) -> None:
+        bullet.setJointMotorControlArray(
+            self._robot, self._joints, bullet.TORQUE_CONTROL, forces=tau.tolist(), physicsClientId=self._client
+        )
+        bullet.stepSimulation(physicsClientId=self._client)
+
+    def push(self, site: str, force: Vector) -> None:
+        for name, link, offset in self.spec.sites:
+            if name == site:
+                origin, quat = self._link_frame(link)
+                point = np.asarray(origin) + _rotation(quat) @ np.asarray(offset)
+                bullet.applyExternalForce(
+                    self._robot,
+                    self._links[link],
+                    force,
+                    point.tolist(),
+                    bullet.WORLD_FRAME,
+                    physicsClientId=self._client,
+                )
+                return
+        raise RobotError("site", site, ", ".join(repr(name) for name, _, _ in self.spec.sites))
+
+    def foot_loads(self) -> tuple[float, ...]:
+        loads = dict.fromkeys(self._feet, 0.0)  # only feet have a collision shape
+        for point in bullet.getContactPoints(self._robot, self._ground, physicsClientId=self._client):
+            loads[point[3]] += point[9]
+        return tuple(loads.values())
+
+    def set_friction(self, coefficient: float) -> None:
+        for foot in self._feet:
+            bullet.changeDynamics(self._robot, foot, lateralFriction=coefficient, physicsClientId=self._client)
+
+    def attach_payload(self, mass: float, position: Vector) -> None:
+        self._detach_payload()
+        client: dict[str, Any] = {"physicsClientId": self._client}
+        center, quat = bullet.getBasePositionAndOrientation(self._robot, **client)
+        offset = np.subtract(position, self._com)
+        point = np.asarray(center) + _rotation(quat) @ offset
+        visual = bullet.createVisualShape(
+            bullet.GEOM_SPHERE, radius=PAYLOAD_RADIUS, rgbaColor=[0.85, 0.45, 0.1, 1.0], **client
+        )
+        body = bullet.createMultiBody(mass, -1, visual, point.tolist(), quat, **client)
+        moment = 0.4 * mass * PAYLOAD_RADIUS**2
+        bullet.changeDynamics(
+            body, -1, localInertiaDiagonal=[moment] * 3, linearDamping=0.0, angularDamping=0.0, **client
+        )
+        joint = bullet.createConstraint(
+            self._robot, -1, body, -1, bullet.JOINT_FIXED, [0, 0, 0], offset.tolist(), [0, 0, 0], **client
+        )
+        bullet.changeConstraint(joint, maxForce=PAYLOAD_FORCE, **client)
+        self._payload = (body, joint)
+
+    def _detach_payload(self) -> None:
+        if self._payload is not None:
+            body, joint = self._payload
+            bullet.removeConstraint(joint, physicsClientId=self._client)
+            bullet.removeBody(body, physicsClientId=self._client)
+            self._payload = None
+
+    def render(self, camera: Camera) -> NDArray[np.uint8]:
+        view = bullet.computeViewMatrixFromYawPitchRoll(
+            camera.target, camera.distance, camera.yaw_deg, -camera.pitch_deg, 0.0, 2
+        )
+        lens = bullet.computeProjectionMatrixFOV(40.0, camera.width / camera.height, 0.05, 30.0)
+        _, _, rgba, _, _ = bullet.getCameraImage(
+            camera.width,
+            camera.height,
+            view,
+            lens,
+            lightDirection=[1.0, 1.5, 3.0],
+            renderer=bullet.ER_TINY_RENDERER,
+            physicsClientId=self._client,
+        )
+        picture = np.asarray(rgba, dtype=np.uint8).reshape(camera.height, camera.width, 4)
+        return picture[..., :3].copy()
+
+    def close(self) -> None:
+        self._finalizer()
+
+    def _arm(self, quat: tuple[float, float, float, float]) -> tuple[float, float, float]:
+        """Base origin to base centre of mass, in world axes; plain floats, since this runs every step."""
+        x, y, z, w = quat
+        cx, cy, cz = self._com
+        tx, ty, tz = 2 * (y * cz - z * cy), 2 * (z * cx - x * cz), 2 * (x * cy - y * cx)
+        return cx + w * tx + y * tz - z * ty, cy + w * ty + z * tx - x * tz, cz + w * tz + x * ty - y * tx
+
+    def _link_frame(self, link: str) -> tuple[Vector, tuple[float, float, float, float]]:
+        index = self._links[link]
+        if index < 0:
+            state = self.read()
+            return state.position, state.quat_xyzw
+        state = bullet.getLinkState(self._robot, index, computeForwardKinematics=1, physicsClientId=self._client)
+        return state[4], state[5]
+
+
+def _rotation(quat_xyzw: tuple[float, float, float, float]) -> Array:
+    return np.array(bullet.getMatrixFromQuaternion(quat_xyzw)).reshape(3, 3)
+
+
+def _disconnect(client: int) -> None:
+    if bullet.isConnected(physicsClientId=client):
+        bullet.disconnect(physicsClientId=client)
