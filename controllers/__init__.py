@@ -1,0 +1,30 @@
+"""Control laws and policies for artde_gym's environments.
+
+`make("artde", env)` gives a policy with Stable-Baselines3's `predict`; the laws themselves are pure functions in
+`controllers.laws`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from artde_gym.registration import make_controller
+from controllers.laws.errors import GainError
+
+__all__ = ["GainError", "make"]
+
+
+def make(name: str, env: Any, **overrides: Any) -> Any:
+    """The controller called `name` for an environment, or for a vector of equal ones.
+
+    Args:
+        name: "tde", "atde", "artde", "artde-robust", "pid", "tde+c", "tde+kd", "computed-torque", or whatever was given
+            to `artde_gym.register_controller`.
+        env: the environment that it will drive.
+        overrides: gains in place of the preset's, and `preset="thesis"` or `"robust"`.
+
+    Raises:
+        UnknownNameError: for a controller or preset that nobody registered.
+        GainError: for an unknown gain or a value that is not allowed.
+    """
+    return make_controller(name, env, **overrides)

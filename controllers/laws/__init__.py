@@ -1,0 +1,1 @@
+"""Control laws as pure functions of NumPy arrays."""

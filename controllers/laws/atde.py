@@ -1,0 +1,87 @@
+"""Adaptive TDE (ATDE): a robust term with one adaptive gain, blind to the state.
+
+    du = alpha c s / sqrt(|s|^2 + eps)
+    c += L gamma_0 |s|     if c <= floor  or  |s_k| > |s_k-1|
+    c -= L gamma_0 |s|     otherwise
+
+The gain of sample k acts in sample k, its change from the next one on. The printed cases overlap at the floor; growth
+wins, as in ARTDE. Source: Dantu 2023, equation 2.38, after Pi, Kang, Xu, Li, Li, "Adaptive time-delay balance control
+of biped robots" (2020).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+
+from controllers.laws.errors import GainError
+from controllers.laws.tde import TdeGains, TdeMemory, tde_start, time_delay
+from controllers.laws.tracking import (
+    Array,
+    Signals,
+    check_non_negative,
+    check_positive,
+    desired_acceleration,
+    errors,
+    inner,
+    is_finite,
+    sliding_variable,
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class AtdeGains(TdeGains):
+    """Gains of TDE and of the robust term.
+
+    Attributes:
+        alpha: factor of the robust term.
+        gamma_0: adaptation rate.
+        c_floor: floor of the gain, above zero.
+        c_start: its value at the start, at least the floor.
+        eps: width of the smooth sign.
+    """
+
+    alpha: float
+    gamma_0: float
+    c_floor: float
+    c_start: float
+    eps: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for field in ("alpha", "c_floor", "eps"):
+            check_positive(field, getattr(self, field))
+        check_non_negative("gamma_0", self.gamma_0)
+        if not (is_finite(self.c_start) and self.c_start >= self.c_floor):
+            raise GainError("c_start", self.c_start, f"a finite number >= c_floor = {self.c_floor:g}")
+
+
+class AtdeMemory(NamedTuple):
+    """TDE's memory, the sliding variable s (..., n), and the gain for the next sample (...)."""
+
+    tde: TdeMemory
+    s: Array
+    c: Array
+
+
+def atde_start(gains: AtdeGains, signals: Signals, period: float) -> AtdeMemory:
+    """Memory before the first sample, as if s had been the same just before."""
+    s = sliding_variable(*errors(signals), gains.k_p, gains.k_d)
+    return AtdeMemory(tde_start(signals, period), s, np.full(s.shape[:-1], gains.c_start, dtype=s.dtype))
+
+
+def atde(
+    gains: AtdeGains, memory: AtdeMemory, signals: Signals, period: float, du: Array | float = 0.0
+) -> tuple[Array, AtdeMemory]:
+    """One sample of the law at the top; `du` (..., n) is added to the robust term."""
+    e, ed = errors(signals)
+    s = sliding_variable(e, ed, gains.k_p, gains.k_d)
+    s_squared = inner(s, s)
+    robust = (gains.alpha * memory.c / np.sqrt(s_squared + gains.eps))[..., None] * s
+    grows = (memory.c <= gains.c_floor) | (s_squared > inner(memory.s, memory.s))
+    step = (period * gains.gamma_0) * np.sqrt(s_squared)
+    u = desired_acceleration(signals, e, ed, gains.k_p, gains.k_d) + robust + du
+    tau, memory_tde = time_delay(gains.m_bar, memory.tde, signals, u, period)
+    return tau, AtdeMemory(memory_tde, s, memory.c + np.where(grows, step, -step))

@@ -1,0 +1,98 @@
+"""What all tracking laws share: the signals of one sample, the errors and the sliding variable."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple, TypeAlias, TypeGuard
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controllers.laws.errors import GainError
+
+Array: TypeAlias = NDArray[np.floating[Any]]
+Gain: TypeAlias = "float | Sequence[float]"
+"""One number for all joints or one a joint."""
+
+
+class Signals(NamedTuple):
+    """One sample of n joints, each (..., n), in rad, rad/s, rad/s^2 and Nm (or m, ..., N).
+
+    `tau_applied` is the generalised force that really acted since the sample before.
+    """
+
+    q: Array
+    qd: Array
+    q_ref: Array
+    qd_ref: Array
+    qdd_ref: Array
+    tau_applied: Array
+
+
+def errors(signals: Signals) -> tuple[Array, Array]:
+    """e = q_ref - q and ed = qd_ref - qd."""
+    return signals.q_ref - signals.q, signals.qd_ref - signals.qd
+
+
+def desired_acceleration(signals: Signals, e: Array, ed: Array, k_p: Gain, k_d: Gain) -> Array:
+    """u_0 = qdd_ref + Kd ed + Kp e (Dantu 2023, equation 2.5c)."""
+    return signals.qdd_ref + times(k_d, ed) + times(k_p, e)
+
+
+def sliding_variable(e: Array, ed: Array, k_p: Gain, k_d: Gain) -> Array:
+    """s = B^T P xi with A^T P + P A = -I for diagonal gains: s = e / (2 Kp) + ed (1 + Kp) / (2 Kp Kd)."""
+    p12, p22 = sliding_weights(k_p, k_d)
+    return times(p12, e) + times(p22, ed)
+
+
+def sliding_weights(k_p: Gain, k_d: Gain) -> tuple[Gain, Gain]:
+    """p12 and p22 of the Lyapunov solution P for Q = I, joint by joint."""
+    if isinstance(k_p, (int, float)) and isinstance(k_d, (int, float)):
+        return 1 / (2 * k_p), (1 + k_p) / (2 * k_p * k_d)
+    p, d = np.broadcast_arrays(np.asarray(k_p, dtype=np.float64), np.asarray(k_d, dtype=np.float64))
+    return tuple((1 / (2 * p)).tolist()), tuple(((1 + p) / (2 * p * d)).tolist())
+
+
+def smooth_sign(s: Array, eps: float) -> Array:
+    """sig(s, eps) = s / sqrt(|s|^2 + eps) (Dantu 2023, equation 2.19), the whole vector by its one norm."""
+    return s / np.sqrt(inner(s, s) + eps)[..., None]
+
+
+def inner(v: Array, w: Array) -> Array:
+    """v^T w over the last axis."""
+    return np.vecdot(v, w)
+
+
+def times(gain: Gain, v: Array) -> Array:
+    """gain v, in the precision of v."""
+    if isinstance(gain, (int, float)):
+        return gain * v
+    return np.asarray(gain, dtype=v.dtype) * v
+
+
+def check_positive(field: str, gain: Gain) -> None:
+    """Raise GainError unless all numbers of `gain` are finite and above zero."""
+    values: tuple[object, ...] = tuple(gain) if isinstance(gain, (list, tuple)) else (gain,)
+    if not values or not all(is_finite(value) and value > 0 for value in values):
+        raise GainError(field, gain, "a finite number > 0, or one a joint")
+
+
+def check_non_negative(field: str, value: float) -> None:
+    """Raise GainError unless `value` is a finite number >= 0."""
+    if not (is_finite(value) and value >= 0):
+        raise GainError(field, value, "a finite number >= 0")
+
+
+def is_finite(value: object) -> TypeGuard[float]:
+    """Whether `value` is a number at all, and a finite one."""
+    return isinstance(value, (int, float)) and math.isfinite(value)
+
+
+def make_plain(gains: Any) -> None:
+    """Turn NumPy's numbers and arrays in a frozen dataclass into Python's, which let float32 signals stay float32."""
+    for field in dataclasses.fields(gains):
+        value = getattr(gains, field.name)
+        if isinstance(value, (np.generic, np.ndarray)):
+            object.__setattr__(gains, field.name, value.tolist())

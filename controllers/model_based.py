@@ -1,0 +1,48 @@
+"""The policy that knows the robot: computed torque with the nominal model of the biped."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from artde_gym.robots.support import Supported
+from controllers.laws.computed_torque import ComputedTorqueGains, computed_torque
+from controllers.laws.tracking import Array, Signals
+from controllers.policies import Memory, Plant, TrackingPolicy
+from controllers.presets import preset_gains
+
+
+class ComputedTorquePolicy(TrackingPolicy):
+    """Computed torque on the inverse dynamics of a robot that stands on its feet as planned.
+
+    The model is the robot without payload and without pushes; the pattern says how the feet share the load.
+    """
+
+    def __init__(self, plant: Plant, gains: ComputedTorqueGains) -> None:
+        super().__init__("computed-torque", plant, gains)
+        self._model = Supported(plant.nominal_robot)
+        self._load = plant.observation["load_left_ref"].start
+
+    def start(self, signals: Signals) -> Memory:
+        return _Nothing()
+
+    def step(self, memory: Any, signals: Signals, observation: Array) -> tuple[Array, Memory]:
+        load_left = observation[..., self._load]
+
+        def inverse_dynamics(q: Array, qd: Array, qdd: Array) -> Array:
+            return self._model.torque(load_left, q, qd, qdd).astype(q.dtype, copy=False)
+
+        return computed_torque(self.gains, signals, inverse_dynamics), memory
+
+
+class _Nothing(NamedTuple):
+    """The memory of a law without one."""
+
+
+def make_computed_torque(env: Any, *, preset: str = "thesis", **gains: Any) -> ComputedTorquePolicy:
+    """The policy for a biped environment, at preset gains with some replaced.
+
+    Raises:
+        UnknownNameError, GainError: as `controllers.policies.make_law`.
+    """
+    plant = Plant.of(env)
+    return ComputedTorquePolicy(plant, preset_gains(plant.robot, "computed-torque", preset, plant.action.size, gains))

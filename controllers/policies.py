@@ -1,0 +1,183 @@
+"""Control laws as policies: observation in, action out, with Stable-Baselines3's `predict`.
+
+A policy holds no state of its own. What a law remembers goes out of `predict` and comes back in as `state`, a tuple of
+arrays with the observations' leading axes, so that one policy object serves any number of environments at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from artde_gym.errors import OptionError
+from artde_gym.layout import Layout
+from controllers.laws.artde import artde, artde_start
+from controllers.laws.atde import atde, atde_start
+from controllers.laws.pid import PidGains, identity_gains, pid, pid_start
+from controllers.laws.tde import ConstantGains, TdeGains, constant_gain_tde, equivalent_gains, tde, tde_start
+from controllers.laws.tracking import Array, Signals
+from controllers.presets import preset_gains
+
+Memory = tuple[Any, ...]
+
+
+class Plant(NamedTuple):
+    """What a policy has to know of the environment that it drives."""
+
+    robot: str
+    observation: Layout
+    action: Layout
+    control_period: float
+    nominal_robot: Any
+
+    @classmethod
+    def of(cls, env: Any) -> Plant:
+        """Read from a Gymnasium environment, wrapped or not, or from a vector of equal ones (Gymnasium's or SB3's)."""
+
+        def read(name: str) -> Any:
+            return env.get_attr(name)[0] if hasattr(env, "num_envs") else getattr(env.unwrapped, name)
+
+        names = ("robot_name", "observation_layout", "action_layout", "control_period", "nominal_robot")
+        return cls(*(read(name) for name in names))
+
+
+class TrackingPolicy:
+    """A tracking law on the environment's observations; subclasses say what happens in one sample.
+
+    Args:
+        name: under which results are listed.
+        plant: the environment that it drives.
+        gains: of the law, in its own terms.
+    """
+
+    def __init__(self, name: str, plant: Plant, gains: Any) -> None:
+        self.name = name
+        self.gains = gains
+        self._size = plant.observation.size
+        self._parts = [(..., plant.observation[field]) for field in Signals._fields]
+        box = plant.action.box()
+        self._low, self._high = box.low, box.high
+
+    def start(self, signals: Signals) -> Memory:
+        """Memory before the first sample."""
+        raise NotImplementedError
+
+    def step(self, memory: Any, signals: Signals, observation: Array) -> tuple[Array, Memory]:
+        """One sample: force (..., n) before saturation, and the memory for the next one."""
+        raise NotImplementedError
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: Memory | None = None,
+        episode_start: ArrayLike | None = None,
+        deterministic: bool = True,
+    ) -> tuple[Array, Memory]:
+        """The action for one observation (n_obs,) or for many (n_env, n_obs).
+
+        Args:
+            observation: as the environment gave it; float32 stays float32.
+            state: what the call before returned; None at the start.
+            episode_start: one truth value an environment; where it is true, that environment's memory is cleared.
+            deterministic: of the protocol; a law has no randomness.
+
+        Raises:
+            OptionError: if the observation's last axis is not as long as the environment's.
+        """
+        del deterministic
+        given = np.asarray(observation)
+        if given.shape[-1:] != (self._size,):
+            raise OptionError("shape of the observation", given.shape, f"(..., {self._size})")
+        signals = Signals(*[given[part] for part in self._parts])
+        if state is None:
+            state = self.start(signals)
+        elif episode_start is not None:
+            fresh = np.asarray(episode_start, dtype=np.bool_).reshape(given.shape[:-1])
+            if fresh.any():
+                state = _choose(fresh, self.start(signals), state)
+        force, state = self.step(state, signals, given)
+        clipped = np.minimum(np.maximum(force, self._low), self._high)
+        return clipped.astype(force.dtype, copy=False), state
+
+    def diagnostics(self, state: Memory) -> dict[str, Array]:
+        """What the memory tells of the law's inside, by name: sigma, s, beta, c, ..., as far as it has them."""
+        return _flatten(state)
+
+
+class LawPolicy(TrackingPolicy):
+    """One of the laws that need nothing but the signals and the sampling period."""
+
+    def __init__(self, name: str, plant: Plant, gains: Any) -> None:
+        law = _LAWS[name]
+        super().__init__(name, plant, law.convert(gains, plant.control_period))
+        self._law = law
+        self._period = plant.control_period
+
+    def start(self, signals: Signals) -> Memory:
+        return self._law.start(self.gains, signals, self._period)
+
+    def step(self, memory: Any, signals: Signals, observation: Array) -> tuple[Array, Memory]:
+        return self._law.step(self.gains, memory, signals, self._period)
+
+
+class _Law(NamedTuple):
+    start: Callable[[Any, Signals, float], Memory]
+    step: Callable[[Any, Any, Signals, float], tuple[Array, Memory]]
+    convert: Callable[[Any, float], Any]  # preset gains and period -> the law's own gains
+
+
+def _tde_start(_gains: TdeGains, signals: Signals, period: float) -> Memory:
+    return tde_start(signals, period)
+
+
+def _pid_start(_gains: PidGains, signals: Signals, period: float) -> Memory:
+    return pid_start(signals, period)
+
+
+def _same(gains: Any, _period: float) -> Any:
+    return gains
+
+
+def _equivalent(gains: ConstantGains, _period: float) -> TdeGains:
+    return equivalent_gains(gains)
+
+
+_LAWS = {
+    "tde": _Law(_tde_start, tde, _same),
+    "atde": _Law(atde_start, atde, _same),
+    "artde": _Law(artde_start, artde, _same),
+    "pid": _Law(_pid_start, pid, identity_gains),
+    "tde+c": _Law(_tde_start, constant_gain_tde, _same),
+    "tde+kd": _Law(_tde_start, tde, _equivalent),
+}
+
+
+def make_law(env: Any, *, law: str, preset: str = "thesis", **gains: Any) -> LawPolicy:
+    """The policy of a law for an environment, at preset gains with some replaced.
+
+    Raises:
+        UnknownNameError: for an unknown preset.
+        GainError: for an unknown gain or a value that is not allowed.
+    """
+    plant = Plant.of(env)
+    return LawPolicy(law, plant, preset_gains(plant.robot, law, preset, plant.action.size, gains))
+
+
+def _choose(mask: NDArray[np.bool_], fresh: Any, kept: Any) -> Any:
+    """Nested named tuples of arrays: `fresh` where the mask is true, `kept` elsewhere; the mask covers leading axes."""
+    names: tuple[str, ...] | None = getattr(kept, "_fields", None)
+    if names is None:
+        new, old = np.asarray(fresh), np.asarray(kept)
+        return np.where(mask.reshape(mask.shape + (1,) * (old.ndim - mask.ndim)), new, old)
+    merged: Any = fresh._replace(**{name: _choose(mask, getattr(fresh, name), getattr(kept, name)) for name in names})
+    return merged
+
+
+def _flatten(memory: Any) -> dict[str, Array]:
+    named: dict[str, Array] = {}
+    for name, value in memory._asdict().items():
+        named.update(_flatten(value) if isinstance(value, tuple) else {name: value})
+    return named
