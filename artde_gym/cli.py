@@ -1,0 +1,167 @@
+"""The `artde-gym` command; the one module here that may import controllers and baselines."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import gymnasium as gym
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from artde_gym import __version__
+from artde_gym.errors import ArtdeGymError, OptionError
+from artde_gym.evaluation import SCENARIOS
+from artde_gym.evaluation import evaluate as run_evaluation
+from artde_gym.evaluation.console import print_result
+from artde_gym.evaluation.evaluate import Update
+from artde_gym.registration import registered_controllers
+from controllers import GainError
+
+MAIN_SCENARIOS = "S1,S2,S1-L4,S2-L4"
+WALK = "BipedWalk-Payload-v0"
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    help="Environments and judges of time-delay control.",
+)
+
+
+def main() -> None:
+    """Run the command; a mistake of the user's is one line on standard error and exit code 2."""
+    try:
+        app()
+    except (ArtdeGymError, GainError, gym.error.Error) as error:
+        typer.echo(f"artde-gym: {error}", err=True)
+        sys.exit(2)
+
+
+@app.command()
+def evaluate(
+    controllers: Annotated[str, typer.Option(help="Names, comma-separated; see `list`.")] = "tde,atde,artde",
+    scenario: Annotated[
+        str | None, typer.Option(help=f"Names, comma-separated. Default: {MAIN_SCENARIOS}, or none with another --env.")
+    ] = None,
+    env: Annotated[str, typer.Option(help="Environment id.")] = WALK,
+    episodes: Annotated[int, typer.Option(help="Seeded episodes of each controller in each scenario.")] = 3,
+    seed: Annotated[int, typer.Option(help="Seed of the whole evaluation.")] = 0,
+    workers: Annotated[int | None, typer.Option(help="Processes. Default: all cores.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Results folder. Default: runs/<date and time>.")] = None,
+    engine: Annotated[str | None, typer.Option(help="Physics engine.")] = None,
+    disturbances: Annotated[str | None, typer.Option(help="JSON, in place of the scenario's own.")] = None,
+    env_kwargs: Annotated[str | None, typer.Option(help="JSON, arguments of the environment.")] = None,
+    gains: Annotated[str | None, typer.Option(help='JSON, e.g. {"artde": {"gamma_0": 200}}.')] = None,
+    trace_hz: Annotated[float, typer.Option(help="Rate of stored signals; inf for all of them.")] = 100.0,
+) -> None:
+    """Compare controllers on the same seeded episodes and print them beside the thesis."""
+    default = MAIN_SCENARIOS if env == WALK else None
+    names = (scenario or default or "").split(",") if (scenario or default) else None
+    kwargs = _json("--env-kwargs", env_kwargs)
+    if engine is not None:
+        kwargs["engine"] = engine
+    folder = out or Path("runs") / datetime.datetime.now().strftime("%Y-%m-%d-%H%M%S")
+    console = Console()
+    with Display(console) as display:
+        result = run_evaluation(
+            [name.strip() for name in controllers.split(",")],
+            env,
+            scenario=names,
+            episodes=episodes,
+            seed=seed,
+            workers=workers or os.cpu_count() or 1,
+            out=folder,
+            disturbances=_json("--disturbances", disturbances) if disturbances is not None else None,
+            env_kwargs=kwargs,
+            gains=_json("--gains", gains),
+            trace_hz=trace_hz,
+            on_progress=display,
+        )
+    print_result(result, console)
+    if not result.complete:
+        raise typer.Exit(130)
+
+
+@app.command("list")
+def list_() -> None:
+    """Show environments, scenarios and controllers."""
+    console = Console()
+    environments = Table("environment", title="Environments", title_justify="left")
+    for spec in gym.registry.values():
+        if str(spec.entry_point).startswith("artde_gym."):
+            environments.add_row(spec.id)
+    scenarios = Table("scenario", "environment", "arguments", "what it is", title="Scenarios", title_justify="left")
+    for entry in SCENARIOS.values():
+        scenarios.add_row(entry.name, entry.env_id, json.dumps(dict(entry.kwargs)), entry.text)
+    known = Table("controller", "what it is", title="Controllers", title_justify="left")
+    for name, spec in registered_controllers().items():
+        known.add_row(name, spec.text)
+    for table in (environments, scenarios, known):
+        console.print(table)
+
+
+@app.callback(invoke_without_command=True)
+def version(
+    show: Annotated[bool, typer.Option("--version", help="Print the version and stop.")] = False,
+) -> None:
+    """Environments and judges of time-delay control."""
+    if show:
+        print(f"artde-gym {__version__}")
+        raise typer.Exit
+
+
+class Display:
+    """Live progress of an evaluation: a bar of finished episodes, and how far the running ones are."""
+
+    def __init__(self, console: Console) -> None:
+        self._running: dict[tuple[str, str, int], float] = {}
+        self._progress = Progress(
+            TextColumn("episodes"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            TextColumn("{task.description}"),
+            console=console,
+        )
+        self._bar = self._progress.add_task("", total=None)
+
+    def __enter__(self) -> Display:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._progress.update(self._bar, description="")
+        self._progress.stop()
+
+    def __call__(self, update: Update) -> None:
+        self._progress.start()  # with the first news; an error before it leaves no empty bar
+        key = (update.task.cell.name, update.task.controller, update.task.episode)
+        self._running[key] = update.time_s
+        if update.ended:
+            del self._running[key]
+        text = ", ".join(
+            f"{name} {controller} #{n}: {time:.0f} s" for (name, controller, n), time in self._running.items()
+        )
+        self._progress.update(self._bar, completed=update.finished, total=update.total, description=text)
+
+
+def _json(option: str, text: str | None) -> dict[str, Any]:
+    if text is None:
+        return {}
+    try:
+        value = json.loads(text)
+    except ValueError as error:
+        raise OptionError(option, text, f"a JSON object ({error})") from error
+    if not isinstance(value, dict):
+        raise OptionError(option, text, "a JSON object")
+    return value
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,127 @@
+"""A result as tables for a terminal, the thesis' numbers beside ours."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import pandas as pd
+from rich import box
+from rich.console import Console, Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from artde_gym.evaluation import statistics, thesis
+from artde_gym.evaluation.result import Result
+from artde_gym.evaluation.scenarios import SCENARIOS
+
+METRICS = {
+    "rmse_deg": "RMS error (deg)",
+    "max_abs_error_deg": "maximum absolute error (deg)",
+    "rms_torque_nm": "RMS torque (Nm)",
+}
+REFERENCE = "artde"
+"""The controller that all others are compared with, if it was evaluated: the claims are about this one."""
+
+
+def print_result(result: Result, console: Console) -> None:
+    """Print every scenario of a result."""
+    if result.episodes.empty:
+        console.print("No episode was finished.")
+        return
+    summary = result.summary()
+    for scenario in result.scenarios:
+        console.print()
+        console.print(_scenario(result, summary, scenario))
+    if not result.complete:
+        console.print("\nInterrupted: the tables hold the episodes that were finished.")
+    if result.folder is not None:
+        console.print(f"\nWritten to {result.folder}")
+
+
+def _scenario(result: Result, summary: pd.DataFrame, scenario: str) -> Group:
+    entry = SCENARIOS.get(scenario)
+    reference = entry.thesis if entry else None
+    title = Text(scenario if entry is None else f"{scenario}: {entry.text}", style="bold")
+    count = max(len(result.rows(scenario, controller)) for controller in result.controllers)
+    note = f"{count} seeded episode{'s' if count > 1 else ''} a controller; mean, change with its 95 % interval"
+    if reference in thesis.TABLES:
+        note += f"; thesis: {thesis.TABLES[reference]}"
+    parts: list[RenderableType] = [title, Text(note, style="dim"), _falls(result, scenario, reference)]
+    axes = [name.removeprefix("rmse_deg_") for name in result.metrics if name.startswith("rmse_deg_")]
+    parts += [_metric(result, summary, scenario, reference, metric, axes) for metric in METRICS]
+    return Group(*parts)
+
+
+def _falls(result: Result, scenario: str, reference: str | None) -> Table:
+    table = _table("controller", "falls", "rate", "95 %", "time to fall (s)", "thesis (s)", title="Falls")
+    for controller in result.controllers:
+        count, rate = result.falls(scenario, controller)
+        times = [row["time_to_fall_s"] for row in result.rows(scenario, controller).values()]
+        time = statistics.mean(times)
+        table.add_row(
+            controller,
+            f"{count}/{rate.n}",
+            _percent(rate.value),
+            f"{_percent(rate.low)}..{_percent(rate.high)}",
+            f"{time.value:.1f} {_span(time.low, time.high, digits=1)}" if time.n else "-",
+            _thesis_fall(reference, controller),
+        )
+    return table
+
+
+def _thesis_fall(reference: str | None, controller: str) -> str:
+    if controller not in ("tde", "atde", "artde") or reference not in thesis.TABLES:
+        return ""
+    time = thesis.TIME_TO_FALL.get(reference, {}).get(controller)
+    return "walks" if time is None else f"falls at {time:g}"
+
+
+def _metric(
+    result: Result, summary: pd.DataFrame, scenario: str, reference: str | None, metric: str, axes: list[str]
+) -> Table:
+    """Two rows an axis, ours and the thesis': one column a controller, one a comparison with the reference."""
+    controllers = result.controllers
+    rivals = [name for name in controllers if name != REFERENCE] if REFERENCE in controllers else []
+    comparisons = {rival: result.compare(REFERENCE, rival).to_dict(orient="index") for rival in rivals}
+    means: dict[Any, float] = summary["mean"].to_dict()
+    table = _table("axis", "", title=METRICS[metric])
+    for name in (*controllers, *(f"{REFERENCE} vs {rival} (%)" for rival in rivals)):
+        table.add_column(name, justify="right")
+    for axis in axes:
+        column = f"{metric}_{axis}"
+        ours = [f"{means[scenario, name, column]:.3f}" for name in controllers]
+        ours += [_comparison(comparisons[rival][scenario, column]) for rival in rivals]
+        table.add_row(axis, "ours", *ours)
+        theirs = [thesis.value(reference, name, metric, axis) for name in controllers]
+        if any(value is not None for value in theirs):
+            cells = ["" if value is None else f"{value:.3f}" for value in theirs]
+            cells += [_change(reference, metric, axis, rival) for rival in rivals]
+            table.add_row("", "thesis", *cells, style="dim")
+    return table
+
+
+def _table(*columns: str, title: str) -> Table:
+    return Table(*columns, title=title, title_justify="left", title_style="italic", box=box.SIMPLE_HEAD, padding=(0, 1))
+
+
+def _comparison(row: Mapping[str, float]) -> str:
+    """Relative difference of the means, with the interval of the paired difference on the same scale."""
+    if row["pairs"] == 0:
+        return "no pair walked"
+    scale = row["percent"] / row["difference"] if row["difference"] else 0.0
+    return f"{row['percent']:+.1f} {_span(*sorted((scale * row['low'], scale * row['high'])), digits=0)}"
+
+
+def _change(reference: str | None, metric: str, axis: str, rival: str) -> str:
+    ours, theirs = (thesis.value(reference, name, metric, axis) for name in (REFERENCE, rival))
+    return "" if ours is None or theirs is None else f"{100 * (ours / theirs - 1):+.1f}"
+
+
+def _span(low: float, high: float, digits: int) -> str:
+    return f"({low:.{digits}f}..{high:.{digits}f})" if math.isfinite(low) else ""
+
+
+def _percent(value: float) -> str:
+    return "-" if not math.isfinite(value) else f"{100 * value:.0f} %"

@@ -1,0 +1,349 @@
+"""Evaluating controllers: the same seeded episodes for each of them, on several processes."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import inspect
+import json
+import multiprocessing
+import os
+import pickle
+import signal
+import threading
+from collections.abc import Callable, Generator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import gymnasium as gym
+import numpy as np
+import pandas as pd
+from gymnasium.envs.registration import load_env_creator
+
+from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.evaluation.result import Result
+from artde_gym.evaluation.rollout import Episode, Policy, run_episode
+from artde_gym.evaluation.scenarios import Scenario
+from artde_gym.evaluation.scenarios import scenario as find_scenario
+from artde_gym.evaluation.store import Store
+from artde_gym.registration import ControllerSpec, make_controller, register_spec, registered_controllers
+
+CUSTOM = "custom"
+"""Name of the scenario when an environment is evaluated as it is."""
+
+ENVIRONMENTS_KEPT = 4  # in a worker; each one holds a physics client
+
+
+class Cell(NamedTuple):
+    """One scenario to run, as plain data that a worker can read."""
+
+    name: str
+    env_id: str
+    kwargs: dict[str, Any]
+
+
+class Task(NamedTuple):
+    """One episode of one controller."""
+
+    cell: Cell
+    controller: str
+    policy: Policy | ControllerSpec
+    gains: dict[str, Any]
+    episode: int
+    seed: int
+    trace_hz: float
+
+
+class Update(NamedTuple):
+    """Progress of an evaluation: one episode's simulated time (s), whether it has ended, and how many have."""
+
+    task: Task
+    time_s: float
+    ended: bool
+    finished: int
+    total: int
+
+
+def evaluate(
+    controllers: Sequence[str | Policy] | Mapping[str, str | Policy],
+    env_id: str = "BipedWalk-Payload-v0",
+    *,
+    scenario: str | Sequence[str] | None = None,
+    episodes: int = 20,
+    seed: int = 0,
+    workers: int = 1,
+    out: str | Path | None = None,
+    disturbances: Mapping[str, Any] | None = None,
+    env_kwargs: Mapping[str, Any] | None = None,
+    gains: Mapping[str, Mapping[str, Any]] | None = None,
+    trace_hz: float = 100.0,
+    on_progress: Callable[[Update], None] | None = None,
+) -> Result:
+    """Run every controller through the same seeded episodes.
+
+    Args:
+        controllers: registered names, or policies with Stable-Baselines3's `predict` (listed under their `name`, else
+            their class); as a mapping, under its keys.
+        env_id: any registered environment of this project; a scenario must belong to it.
+        scenario: one or several names of `artde_gym.evaluation.scenarios`; None for the environment as it is.
+        episodes: of each controller in each scenario.
+        seed: of the whole evaluation; episode i has the same seed for every controller and scenario.
+        workers: processes; the results do not depend on it.
+        out: folder to store them in; the same call continues an interrupted one. Nothing is stored without it.
+        disturbances: in place of the scenario's or the environment's own.
+        env_kwargs: arguments of the environment, on top of the scenario's.
+        gains: controller name -> gains in place of its preset's.
+        trace_hz: rate of stored signals; infinite for all of them.
+        on_progress: called about once a simulated second of each running episode, and at its end.
+
+    Returns:
+        The result; `complete` is False after an interruption (Ctrl-C), with all finished episodes in it.
+
+    Raises:
+        UnknownNameError, OptionError, DisturbanceError, GainError: for a bad argument, before the first episode.
+        StoreError: if `out` holds other results.
+    """
+    if not (isinstance(episodes, int) and episodes >= 1):
+        raise OptionError("episodes", episodes, "a whole number >= 1")
+    if not (isinstance(workers, int) and workers >= 1):
+        raise OptionError("workers", workers, "a whole number >= 1")
+    if not (isinstance(seed, int) and seed >= 0):
+        raise OptionError("seed", seed, "a whole number >= 0")
+    if not trace_hz > 0:
+        raise OptionError("trace_hz", trace_hz, "a number > 0")
+    named = _named(controllers)
+    gains = {name: dict(values) for name, values in (gains or {}).items()}
+    for name in gains:
+        if name not in named:
+            raise UnknownNameError("gains", name, among(name, named))
+    cells = _cells(env_id, scenario, dict(env_kwargs or {}), disturbances)
+    _try_out(cells, named, gains)
+
+    tasks = [
+        Task(cell, name, policy, gains.get(name, {}), episode, episode_seed(seed, episode), trace_hz)
+        for episode in range(episodes)  # outermost, so that an interruption leaves whole pairs behind
+        for cell in cells
+        for name, policy in named.items()
+    ]
+    store = None
+    if out is not None:
+        configuration = {
+            "cells": [cell._asdict() for cell in cells],
+            "controllers": {name: _identity(policy) for name, policy in named.items()},
+            "gains": gains,
+            "episodes": episodes,
+            "seed": seed,
+            "trace_hz": trace_hz if np.isfinite(trace_hz) else "all",
+        }
+        store = Store(Path(out), configuration)
+    rows = [] if store is None else store.rows
+    done = {(row["scenario"], row["controller"], row["episode"]) for row in rows}
+    pending = [task for task in tasks if (task.cell.name, task.controller, task.episode) not in done]
+    finished = len(tasks) - len(pending)
+
+    def report(task: Task, time: float, ended: bool) -> None:
+        nonlocal finished
+        finished += ended
+        if on_progress is not None:
+            on_progress(Update(task, time, ended, finished, len(tasks)))
+
+    complete = True
+    runs = _run_here(pending, report) if workers == 1 else _run_parallel(pending, workers, report)
+    try:
+        for task, episode in runs:
+            row = {**_labels(task), **episode.row}
+            if store is None:
+                rows.append(row)
+            else:
+                store.add(row, episode.traces)
+    except KeyboardInterrupt:
+        complete = False
+    finally:
+        runs.close()
+    order = {key: i for i, key in enumerate((task.cell.name, task.controller, task.episode) for task in tasks)}
+    rows = sorted(rows, key=lambda row: order[row["scenario"], row["controller"], row["episode"]])
+    result = Result(pd.DataFrame(rows), None if store is None else store.folder, complete)
+    if store is not None and rows:
+        store.finish(rows, result.summary())
+    return result
+
+
+Report = Callable[[Task, float, bool], None]
+
+
+def episode_seed(seed: int, episode: int) -> int:
+    """Seed of one episode: independent streams for all pairs of numbers."""
+    return int(np.random.SeedSequence([seed, episode]).generate_state(1)[0])
+
+
+def _named(controllers: Any) -> dict[str, Policy | ControllerSpec]:
+    """Controllers by the name under which they are listed, names replaced by what they stand for."""
+    if isinstance(controllers, Mapping):
+        pairs = list(controllers.items())
+    else:
+        pairs = [
+            (item if isinstance(item, str) else getattr(item, "name", type(item).__name__), item)
+            for item in controllers
+        ]
+    if not pairs:
+        raise OptionError("controllers", controllers, "at least one")
+    known = registered_controllers()
+    named: dict[str, Policy | ControllerSpec] = {}
+    for label, item in pairs:
+        if label in named:
+            raise OptionError("controllers", label, "each name once; give a mapping to tell two of one name apart")
+        if isinstance(item, str):
+            if item not in known:
+                raise UnknownNameError("controller", item, among(item, known))
+            named[label] = known[item]
+        elif hasattr(item, "predict"):
+            named[label] = item
+        else:
+            raise OptionError("controllers", item, "a registered name, or an object with `predict`")
+    return named
+
+
+def _cells(
+    env_id: str, names: str | Sequence[str] | None, kwargs: dict[str, Any], disturbances: Mapping[str, Any] | None
+) -> list[Cell]:
+    if names is None:
+        own = {} if disturbances is None else {"disturbances": dict(disturbances)}
+        return [Cell(CUSTOM, env_id, {**kwargs, **own})]
+    entries: list[Scenario] = [find_scenario(name) for name in ([names] if isinstance(names, str) else names)]
+    if not entries:
+        raise OptionError("scenario", names, "at least one name, or None")
+    for entry in entries:
+        if entry.env_id != env_id:
+            raise OptionError(f"environment of scenario {entry.name!r}", env_id, repr(entry.env_id))
+    return [
+        Cell(entry.name, env_id, {**entry.kwargs, **kwargs, "disturbances": dict(disturbances or entry.disturbances)})
+        for entry in entries
+    ]
+
+
+def _try_out(cells: list[Cell], named: Mapping[str, Any], gains: Mapping[str, dict[str, Any]]) -> None:
+    """Build everything once, so that a bad argument shows before the first episode and not in a worker."""
+    for cell in cells:
+        try:
+            arguments = json.dumps(cell.kwargs)
+        except TypeError as error:
+            raise OptionError("env_kwargs", cell.kwargs, "values that JSON can write") from error
+        env = _environment(cell.env_id, arguments)
+        if not hasattr(env.unwrapped, "observation_layout"):
+            raise OptionError("env_id", cell.env_id, "an environment of artde_gym")
+        for name, item in named.items():
+            _policy(item, env, gains.get(name, {}))
+
+
+def _identity(item: Policy | ControllerSpec) -> str:
+    """What tells controllers apart in a store: the entry point, or the content of a policy object."""
+    if isinstance(item, ControllerSpec):
+        return f"{item.entry_point} {json.dumps(dict(item.kwargs), sort_keys=True)}"
+    return f"{type(item).__name__} {hashlib.sha256(pickle.dumps(item)).hexdigest()}"
+
+
+def _labels(task: Task) -> dict[str, Any]:
+    return {
+        "controller": task.controller,
+        "env": task.cell.env_id,
+        "scenario": task.cell.name,
+        "seed": task.seed,
+        "episode": task.episode,
+    }
+
+
+def _run_here(tasks: list[Task], report: Report) -> Generator[tuple[Task, Episode], None, None]:
+    for task in tasks:
+        episode = _run_task(task, lambda time, task=task: report(task, time, False))
+        report(task, episode.row["duration_s"], True)
+        yield task, episode
+
+
+def _run_parallel(tasks: list[Task], workers: int, report: Report) -> Generator[tuple[Task, Episode], None, None]:
+    context = multiprocessing.get_context("spawn")  # a fork would copy physics clients and locks
+    channel, stop = context.Queue(), context.Event()
+    threads = os.environ.get("OMP_NUM_THREADS")
+    os.environ["OMP_NUM_THREADS"] = "1"  # inherited by workers: one core each
+    pool = ProcessPoolExecutor(min(workers, len(tasks) or 1), context, _start_worker, (channel, stop))
+    try:
+        with _ignored_interrupt():  # what a new process inherits: Ctrl-C goes to the whole group, the parent decides
+            running = {pool.submit(_run_in_worker, i, task): i for i, task in enumerate(tasks)}
+        while running:
+            finished, _ = wait(running, timeout=0.2, return_when=FIRST_COMPLETED)
+            while not channel.empty():
+                index, time = channel.get()
+                report(tasks[index], time, False)
+            for future in finished:
+                task = tasks[running.pop(future)]
+                episode = future.result()
+                report(task, episode.row["duration_s"], True)
+                yield task, episode
+    finally:
+        stop.set()
+        pool.shutdown(wait=True, cancel_futures=True)
+        channel.close()
+        if threads is None:
+            del os.environ["OMP_NUM_THREADS"]
+        else:
+            os.environ["OMP_NUM_THREADS"] = threads
+
+
+@contextlib.contextmanager
+def _ignored_interrupt() -> Generator[None, None, None]:
+    if threading.current_thread() is not threading.main_thread():
+        yield  # only the main thread may set handlers, and only it is interrupted
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+_worker: dict[str, Any] = {}
+"""A worker process's own: the channel for its progress and the event that asks it to stop."""
+
+
+class _StoppedError(Exception):
+    """Raised in a worker in the middle of an episode that nobody waits for."""
+
+
+def _start_worker(channel: Any, stop: Any) -> None:
+    _worker.update(channel=channel, stop=stop)
+
+
+def _run_in_worker(index: int, task: Task) -> Episode:
+    def on_progress(time: float) -> None:
+        if _worker["stop"].is_set():
+            raise _StoppedError
+        _worker["channel"].put((index, time))
+
+    return _run_task(task, on_progress)
+
+
+def _run_task(task: Task, on_progress: Callable[[float], None]) -> Episode:
+    env = _environment(task.cell.env_id, json.dumps(task.cell.kwargs))
+    policy = _policy(task.policy, env, task.gains)
+    return run_episode(env, policy, task.seed, trace_hz=task.trace_hz, on_progress=on_progress)
+
+
+def _policy(item: Policy | ControllerSpec, env: Any, gains: dict[str, Any]) -> Policy:
+    if isinstance(item, ControllerSpec):
+        register_spec(item)  # a worker knows only what this project registers itself
+        return make_controller(item.name, env, **gains)
+    if gains:
+        raise OptionError("gains", gains, "gains of registered names; a policy object has its own")
+    return item
+
+
+@functools.lru_cache(maxsize=ENVIRONMENTS_KEPT)
+def _environment(env_id: str, kwargs: str) -> Any:
+    """An environment by id and JSON arguments; building one takes seconds, so a few are kept."""
+    arguments = json.loads(kwargs)
+    known = inspect.signature(load_env_creator(str(gym.spec(env_id).entry_point))).parameters
+    for name in arguments:
+        if name not in known:
+            raise OptionError(f"argument of {env_id}", name, among(name, known))
+    return gym.make(env_id, disable_env_checker=True, **arguments)

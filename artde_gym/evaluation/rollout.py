@@ -1,0 +1,119 @@
+"""One episode: an environment, a policy and a seed in; metrics and traces out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from artde_gym.evaluation.metrics import Recording, episode_metrics
+
+Array = NDArray[Any]
+
+PROGRESS_INTERVAL = 1.0  # s of simulated time
+
+
+class Policy(Protocol):
+    """Stable-Baselines3's predictor protocol; `diagnostics(state)` is recorded where a policy has it."""
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
+    ) -> tuple[Any, Any]: ...
+
+
+class Episode(NamedTuple):
+    """Metrics as one row, and signals over time: "time" (samples,) and (samples, size) each by name."""
+
+    row: dict[str, Any]
+    traces: dict[str, Array]
+
+
+def run_episode(
+    env: Any,
+    policy: Policy,
+    seed: int,
+    *,
+    options: dict[str, Any] | None = None,
+    trace_hz: float = 100.0,
+    on_progress: Callable[[float], None] | None = None,
+) -> Episode:
+    """Drive `env` with `policy` from a seeded reset to the end.
+
+    Args:
+        env: an environment of this project, wrapped or not.
+        seed: of the reset; the same seed has the same disturbances whatever the policy.
+        options: of the reset.
+        trace_hz: rate of the traces, at most the control rate; infinite for every sample.
+        on_progress: called with the simulated time (s) about once a simulated second.
+    """
+    plant = env.unwrapped
+    period: float = plant.control_period
+    stride = max(1, round(1.0 / (trace_hz * period)))
+    report_every = max(1, round(PROGRESS_INTERVAL / period))
+    diagnose = getattr(policy, "diagnostics", None)
+
+    observation, info = env.reset(seed=seed, options=options)
+    disturbances = info["disturbances"]
+    observations, diagnostics = [observation], []
+    state, episode_start = None, True
+    terminated = truncated = False
+    total = 0.0
+    while not (terminated or truncated):
+        action, state = policy.predict(observation, state=state, episode_start=episode_start, deterministic=True)
+        episode_start = False
+        count = len(observations)
+        if diagnose is not None and (count - 1) % stride == 0:
+            diagnostics.append(diagnose(state))
+        observation, reward, terminated, truncated, info = env.step(action)
+        total += float(reward)
+        observations.append(observation)
+        if on_progress is not None and count % report_every == 0:
+            on_progress(info["time_s"])
+
+    fields = plant.observation_layout.split(np.array(observations))
+    inside = _stack(diagnostics)
+    pushes = tuple((push["start"], push["start"] + push["duration"]) for push in disturbances.get("push", ()))
+    recording = Recording(
+        period=period,
+        fields=fields,
+        limit=plant.action_space.high,
+        axes=plant.reported_axes,
+        mass=plant.nominal_robot.mass + disturbances.get("payload", {}).get("mass", 0.0),
+        pushes=pushes,
+        sigma=inside.get("sigma"),
+    )
+    row = {
+        "fell": bool(terminated),
+        "fall_reason": info.get("fall_reason", ""),
+        "time_to_fall_s": info["time_s"] if terminated else float("nan"),
+        "duration_s": info["time_s"],
+        "reward": total,
+        **episode_metrics(recording),
+        **_flatten(disturbances),
+    }
+    traces = {"time": period * np.arange(0, len(observations), stride)}
+    traces.update({name: values[::stride].astype(np.float32) for name, values in fields.items()})
+    traces.update({f"policy.{name}": values.astype(np.float32) for name, values in inside.items()})
+    return Episode(row, traces)
+
+
+def _stack(samples: list[dict[str, Array]]) -> dict[str, Array]:
+    return {name: np.array([sample[name] for sample in samples]) for name in samples[0]} if samples else {}
+
+
+def _flatten(disturbances: dict[str, Any]) -> dict[str, Any]:
+    """Realised values as columns: payload.mass, push.0.magnitude, ..."""
+    columns: dict[str, Any] = {}
+
+    def visit(path: str, value: Any) -> None:
+        items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else None
+        if items is None:
+            columns[f"disturbance.{path}"] = value
+        else:
+            for key, item in items:
+                visit(f"{path}.{key}" if path else str(key), item)
+
+    visit("", disturbances)
+    return columns

@@ -1,0 +1,64 @@
+"""Named scenarios: an environment, its arguments and what happens in it, fixed on physical grounds.
+
+Every biped scenario varies from seed to seed, so that a result is a rate and not a single trajectory: a kick on the
+torso of 0.5 to 5 N for 0.2 s at 1 s from any side, friction of 0.7 to 0.9, and a payload up to 1 cm off its place.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+from artde_gym.errors import UnknownNameError, among
+
+_KICK = {
+    "body": "torso",
+    "magnitude": {"uniform": [0.5, 5.0]},
+    "direction": [{"normal": [0.0, 1.0]}, {"normal": [0.0, 1.0]}, 0.0],
+    "start": 1.0,
+    "duration": 0.2,
+}
+_VARIATION: dict[str, Any] = {"push": [_KICK], "friction": {"uniform": [0.7, 0.9]}}
+_PAYLOAD: dict[str, Any] = {
+    "mass": 1.3,
+    "position": [{"uniform": [-0.01, 0.01]}, {"uniform": [-0.01, 0.01]}, {"uniform": [0.15, 0.17]}],
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Scenario:
+    """One entry; `thesis` names the thesis' scenario that it stands beside, if any."""
+
+    name: str
+    env_id: str
+    kwargs: Mapping[str, Any]
+    disturbances: Mapping[str, Any]
+    text: str
+    thesis: str | None = None
+
+
+_WALK = "BipedWalk-Payload-v0"
+_SLOW = {"control_period": 0.004}
+_S2 = {"payload": _PAYLOAD, **_VARIATION}
+
+SCENARIOS: dict[str, Scenario] = {
+    entry.name: entry
+    for entry in (
+        Scenario("S1", _WALK, {}, _VARIATION, "walk without payload, L = 1 ms", "S1"),
+        Scenario("S2", _WALK, {}, _S2, "walk with a payload of 1.3 kg, L = 1 ms", "S2"),
+        Scenario("S1-L4", _WALK, _SLOW, _VARIATION, "S1 at L = 4 ms: a quarter of the joint stiffness", "S1"),
+        Scenario("S2-L4", _WALK, _SLOW, _S2, "S2 at L = 4 ms", "S2"),
+    )
+}
+
+
+def scenario(name: str) -> Scenario:
+    """The scenario called `name`.
+
+    Raises:
+        UnknownNameError: if there is none.
+    """
+    if name not in SCENARIOS:
+        raise UnknownNameError("scenario", name, among(name, SCENARIOS))
+    return SCENARIOS[name]

@@ -1,0 +1,151 @@
+"""A results folder: finished episodes one by one, then the summary.
+
+    episodes.csv     one row an episode and controller, appended as each one finishes
+    summary.csv      mean and 95 % interval of every metric
+    summary.json     configuration and provenance, written before the first episode
+    traces/          <scenario>/<controller>-<episode>.npz, signals at the trace's rate
+
+A folder belongs to one configuration: the same one continues it, any other is refused.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import io
+import json
+import os
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from artde_gym.errors import StoreError
+from artde_gym.evaluation.provenance import provenance
+
+KEY = ("scenario", "controller", "episode")
+
+
+class Store:
+    """The folder of one evaluation.
+
+    Raises:
+        StoreError: if the folder holds anything else than results of the same configuration.
+    """
+
+    def __init__(self, folder: Path, configuration: Mapping[str, Any]) -> None:
+        self.folder = folder
+        self._configuration = json.loads(json.dumps(configuration))
+        self._claim()
+        self.rows = self._read_rows()
+        self._columns = list(self.rows[0]) if self.rows else []
+
+    def add(self, row: Mapping[str, Any], traces: Mapping[str, NDArray[Any]]) -> None:
+        """Keep one finished episode; its row is written last, so that a row always has its traces."""
+        self.save_traces(row, traces)
+        self.rows.append(dict(row))
+        if set(row) == set(self._columns):
+            with (self.folder / "episodes.csv").open("a", encoding="utf-8", newline="") as file:
+                file.write(_line([row[column] for column in self._columns]))
+                file.flush()
+                os.fsync(file.fileno())
+        else:
+            self._rewrite()
+
+    def save_traces(self, row: Mapping[str, Any], traces: Mapping[str, NDArray[Any]]) -> None:
+        folder = self.folder / "traces" / str(row["scenario"])
+        folder.mkdir(parents=True, exist_ok=True)
+        path = folder / f"{row['controller']}-{row['episode']}.npz"
+        write_atomically(path, lambda file: np.savez_compressed(file, **traces))  # pyright: ignore[reportArgumentType]
+
+    def finish(self, rows: list[dict[str, Any]], summary: pd.DataFrame) -> None:
+        """Write the rows in their final order, and the summary."""
+        self.rows = rows
+        self._rewrite()
+        write_atomically(self.folder / "summary.csv", lambda file: summary.to_csv(file))
+        self._write_record(summary)
+
+    def _claim(self) -> None:
+        record = self.folder / "summary.json"
+        if record.exists():
+            try:
+                found = json.loads(record.read_text(encoding="utf-8"))["configuration"]
+            except (OSError, ValueError, KeyError, TypeError) as error:
+                raise StoreError(
+                    "output folder", str(self.folder), "a folder whose summary.json can be read"
+                ) from error
+            if found != self._configuration:
+                differs = [
+                    key for key in {*found, *self._configuration} if found.get(key) != self._configuration.get(key)
+                ]
+                allowed = f"a new folder; this one holds other results (different: {', '.join(sorted(differs))})"
+                raise StoreError("output folder", str(self.folder), allowed)
+            return
+        if self.folder.exists() and (not self.folder.is_dir() or any(self.folder.iterdir())):
+            raise StoreError("output folder", str(self.folder), "a new or empty folder; this one holds something else")
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self._write_record(None)
+
+    def _write_record(self, summary: pd.DataFrame | None) -> None:
+        record = {
+            "configuration": self._configuration,
+            "provenance": provenance(),
+            "episodes": 0 if summary is None else len(self.rows),
+            "summary": [] if summary is None else json.loads(str(summary.reset_index().to_json(orient="records"))),
+        }
+        text = json.dumps(record, indent=2) + "\n"
+        write_atomically(self.folder / "summary.json", lambda file: file.write(text.encode()))
+
+    def _read_rows(self) -> list[dict[str, Any]]:
+        path = self.folder / "episodes.csv"
+        if not path.exists():
+            return []
+        text = path.read_text(encoding="utf-8")
+        whole = text[: text.rfind("\n") + 1]  # a row cut off by a crash has no end of line
+        if not whole:
+            return []
+        frame = pd.read_csv(io.StringIO(whole), keep_default_na=True)
+        missing = [name for name in KEY if name not in frame]
+        if missing:
+            raise StoreError("episodes.csv", str(path), f"a table with the columns {', '.join(KEY)}")
+        rows = [{str(key): value for key, value in row.items()} for row in frame.to_dict(orient="records")]
+        for row in rows:
+            row["fall_reason"] = row["fall_reason"] if isinstance(row.get("fall_reason"), str) else ""
+        if whole != text:
+            write_atomically(path, lambda file: file.write(whole.encode()))
+        return rows
+
+    def _rewrite(self) -> None:
+        """The whole table, for rows with columns of their own."""
+        self._columns = list(dict.fromkeys(column for row in self.rows for column in row))
+        lines = [_line(self._columns)]
+        lines += [_line([row.get(column, "") for column in self._columns]) for row in self.rows]
+        write_atomically(self.folder / "episodes.csv", lambda file: file.write("".join(lines).encode()))
+
+
+def write_atomically(path: Path, write: Callable[[BinaryIO], Any]) -> None:
+    """Write a file so that it is there whole or not at all."""
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            write(file)
+            file.flush()
+            os.fsync(file.fileno())
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            os.unlink(temporary)
+        raise
+
+
+def _line(values: list[Any]) -> str:
+    buffer = io.StringIO()
+    csv.writer(buffer, lineterminator="\n").writerow(
+        "" if value != value else value for value in values
+    )  # NaN is empty
+    return buffer.getvalue()

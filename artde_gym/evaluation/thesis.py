@@ -1,0 +1,48 @@
+"""What Dantu 2023 reports, number by number, to be printed beside ours.
+
+The tables' "MAE" is the maximum absolute error. S1 lists for ARTDE's q3 a maximum (1.447) below the RMS value (1.455);
+the number is kept as printed.
+"""
+
+from __future__ import annotations
+
+JOINTS = ("q1", "q2", "q3", "q4", "q5", "q6")
+"""Right leg: hip yaw, hip roll, hip pitch, knee, ankle pitch, ankle roll."""
+
+TABLES: dict[str, str] = {"S1": "Table 2.1", "S2": "Table 2.2"}
+
+_S1 = {
+    "tde": {
+        "rmse_deg": (0.108, 0.653, 2.231, 3.264, 3.254, 1.147),
+        "max_abs_error_deg": (0.173, 1.841, 2.456, 8.7415, 8.660, 5.976),
+        "rms_torque_nm": (2.864, 3.964, 5.965, 5.901, 7.764, 3.133),
+    },
+    "atde": {
+        "rmse_deg": (0.035, 0.551, 1.847, 2.671, 2.741, 1.023),
+        "max_abs_error_deg": (0.225, 0.945, 1.889, 7.483, 6.601, 6.190),
+        "rms_torque_nm": (3.076, 4.176, 6.003, 5.783, 7.861, 3.479),
+    },
+    "artde": {
+        "rmse_deg": (0.024, 0.436, 1.455, 2.072, 2.190, 0.741),
+        "max_abs_error_deg": (0.075, 0.746, 1.447, 5.407, 4.656, 2.415),
+        "rms_torque_nm": (2.826, 4.022, 5.883, 5.532, 7.832, 3.148),
+    },
+}
+_S2 = {
+    "artde": {
+        "rmse_deg": (0.026, 0.436, 1.466, 2.120, 2.205, 0.777),
+        "max_abs_error_deg": (0.063, 0.747, 3.140, 5.407, 5.944, 2.795),
+        "rms_torque_nm": (2.826, 4.006, 5.882, 5.657, 7.974, 3.253),
+    },
+}
+VALUES: dict[str, dict[str, dict[str, tuple[float, ...]]]] = {"S1": _S1, "S2": _S2}
+"""scenario -> controller -> metric -> one value a joint."""
+
+TIME_TO_FALL: dict[str, dict[str, float]] = {"S2": {"tde": 26.0, "atde": 31.0}}
+"""scenario -> controller -> s; a controller that is not here walked to the end."""
+
+
+def value(scenario: str | None, controller: str, metric: str, joint: str) -> float | None:
+    """The thesis' number, or None where it has none."""
+    values = VALUES.get(scenario or "", {}).get(controller, {}).get(metric)
+    return None if values is None else values[JOINTS.index(joint)]
