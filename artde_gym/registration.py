@@ -71,7 +71,8 @@ def make_controller(name: str, env: Any, **overrides: Any) -> Any:
 
 def register_all() -> None:
     """Register what this project brings; called once, by `import artde_gym`."""
-    gym.register(id="BipedWalk-Payload-v0", entry_point="artde_gym.envs.biped:BipedWalkPayloadEnv")
+    gym.register(id="BipedWalk-Payload-v0", entry_point="artde_gym.envs.biped_walk:BipedWalkPayloadEnv")
+    gym.register(id="BipedPush-v0", entry_point="artde_gym.envs.biped_push:BipedPushEnv")
     law = "controllers.policies:make_law"
     register_controller("tde", law, law="tde", text="time-delay estimation")
     register_controller("atde", law, law="atde", text="TDE + one adaptive gain")

@@ -155,15 +155,30 @@ _LAWS = {
 }
 
 
-def make_law(env: Any, *, law: str, preset: str = "thesis", **gains: Any) -> LawPolicy:
+def make_law(
+    env: Any, *, law: str, preset: str = "thesis", velocity_cutoff_hz: float | None = None, **gains: Any
+) -> TrackingPolicy:
     """The policy of a law for an environment, at preset gains with some replaced.
+
+    Args:
+        env: the environment that it will drive.
+        law: name of the law.
+        preset: name of its gains.
+        velocity_cutoff_hz: with a number, velocities are estimated from the observed angles by a low-pass of this
+            bandwidth, as behind encoders; without, the observed velocities are used.
+        gains: in place of the preset's.
 
     Raises:
         UnknownNameError: for an unknown preset.
         GainError: for an unknown gain or a value that is not allowed.
     """
     plant = Plant.of(env)
-    return LawPolicy(law, plant, preset_gains(plant.robot, law, preset, plant.action.size, gains))
+    policy = LawPolicy(law, plant, preset_gains(plant.robot, law, preset, plant.action.size, gains))
+    if velocity_cutoff_hz is None:
+        return policy
+    from controllers.encoders import EncoderPolicy  # it builds on this module
+
+    return EncoderPolicy(policy, plant, velocity_cutoff_hz)
 
 
 def _choose(mask: NDArray[np.bool_], fresh: Any, kept: Any) -> Any:

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from artde_gym.disturbances.kinds import KINDS, Kind, Parameter
+from artde_gym.disturbances.kinds import ALL, KINDS, Kind, Parameter, allowed
 from artde_gym.errors import DisturbanceError, among
 
 DISTRIBUTIONS = ("uniform", "normal", "choice")
@@ -36,8 +36,10 @@ class Disturbances:
     entries: tuple[tuple[str, Mapping[str, Any]], ...] = ()
 
     @classmethod
-    def parse(cls, given: Mapping[str, Any] | None, sites: Collection[str]) -> Disturbances:
-        """Check `given` against the grammar; `sites` are the places that this robot can be pushed at.
+    def parse(
+        cls, given: Mapping[str, Any] | None, sites: Collection[str], joints: Collection[str] = ()
+    ) -> Disturbances:
+        """Check `given` against the grammar, for a robot that has these sites to be pushed at and these joints.
 
         Raises:
             DisturbanceError: for an unknown kind, key or site, a wrong type, a value out of range or not finite.
@@ -53,7 +55,8 @@ class Disturbances:
         for name, kind in KINDS.items():
             if name in given:
                 for path, entry in _entries(kind, given[name]):
-                    entries.append((name, _parse_entry(kind, entry, path, sites)))
+                    parsed = _parse_entry(kind, entry, path, {"site": sites, "joint": (*joints, ALL)})
+                    entries += [(name, one) for one in _each_joint(parsed, joints)]
         return cls(tuple(entries))
 
     def draw(self, rng: np.random.Generator) -> dict[str, Any]:
@@ -90,7 +93,12 @@ def _entries(kind: Kind, given: Any) -> list[tuple[str, Any]]:
     raise DisturbanceError(kind.name, given, "a list of mappings")
 
 
-def _parse_entry(kind: Kind, given: Any, path: str, sites: Collection[str]) -> dict[str, Any]:
+def _each_joint(entry: dict[str, Any], joints: Collection[str]) -> list[dict[str, Any]]:
+    """One entry a joint where the given one names "all" of them, so that each draws a value of its own."""
+    return [{**entry, "joint": joint} for joint in joints] if entry.get("joint") == ALL else [entry]
+
+
+def _parse_entry(kind: Kind, given: Any, path: str, words: Mapping[str, Collection[str]]) -> dict[str, Any]:
     names = {parameter.name: parameter for parameter in kind.parameters}
     if kind.scalar is not None and (_is_number(given) or _is_distribution(given)):
         given = {kind.scalar: given}
@@ -103,15 +111,16 @@ def _parse_entry(kind: Kind, given: Any, path: str, sites: Collection[str]) -> d
     for name, parameter in names.items():
         field = f"{path}.{name}"
         if name not in given and parameter.default is None:
-            raise DisturbanceError(field, None, f"{_range(parameter)} (it has no default)")
+            raise DisturbanceError(field, None, f"{allowed(parameter)} (it has no default)")
         value = given.get(name, parameter.default)
-        entry[name] = _word(value, field, sites) if parameter.size == 0 else _check(value, parameter, field)
+        entry[name] = _word(value, parameter, field, words) if parameter.size == 0 else _check(value, parameter, field)
     return entry
 
 
-def _word(value: Any, field: str, allowed: Collection[str]) -> str:
-    if not (isinstance(value, str) and value in allowed):
-        raise DisturbanceError(field, value, among(value, allowed))
+def _word(value: Any, parameter: Parameter, field: str, words: Mapping[str, Collection[str]]) -> str:
+    known = words[parameter.words] if isinstance(parameter.words, str) else parameter.words
+    if not (isinstance(value, str) and value in known):
+        raise DisturbanceError(field, value, among(value, known))
     return value
 
 
@@ -129,7 +138,11 @@ def _check(value: Any, parameter: Parameter, field: str) -> Any:
             raise DisturbanceError(field, value, "any vector but zero")
         return checked
     if not (_is_number(value) and parameter.low <= value <= parameter.high):  # nan fails both comparisons
-        raise DisturbanceError(field, value, _range(parameter))
+        raise DisturbanceError(field, value, allowed(parameter))
+    if parameter.integer:
+        if value != int(value):
+            raise DisturbanceError(field, value, allowed(parameter))
+        return int(value)
     return float(value)
 
 
@@ -151,11 +164,11 @@ def _check_distribution(kind: str, arguments: Any, parameter: Parameter, field: 
         second = _check(arguments[1], parameter, f"{field}.uniform[1]")
         if first > second:
             raise DisturbanceError(f"{field}.uniform", arguments, "two numbers, the lower one first")
-    else:
-        second = arguments[1]
-        if not (_is_number(second) and 0 <= second <= sys.float_info.max):
-            raise DisturbanceError(f"{field}.normal[1]", second, "a finite standard deviation >= 0")
-    return [first, float(second)]
+        return [first, second]
+    deviation = arguments[1]
+    if not (_is_number(deviation) and 0 <= deviation <= sys.float_info.max):
+        raise DisturbanceError(f"{field}.normal[1]", deviation, "a finite standard deviation >= 0")
+    return [first, float(deviation)]
 
 
 def _draw(value: Any, parameter: Parameter, rng: np.random.Generator) -> Any:
@@ -171,11 +184,12 @@ def _draw(value: Any, parameter: Parameter, rng: np.random.Generator) -> Any:
     if kind == "choice":
         return _draw(arguments[int(rng.integers(len(arguments)))], parameter, rng)  # a vector may hold distributions
     if kind == "uniform":
-        return float(rng.uniform(*arguments))
+        low, high = arguments
+        return int(rng.integers(low, high + 1)) if parameter.integer else float(rng.uniform(low, high))
     for _ in range(NORMAL_DRAWS):
         drawn = float(rng.normal(*arguments))
         if parameter.low <= drawn <= parameter.high:
-            return drawn
+            return round(drawn) if parameter.integer else drawn
     return arguments[0]
 
 
@@ -194,8 +208,3 @@ def _is_distribution(value: Any) -> bool:
 def _may_be_nonzero(component: Any) -> bool:
     """Whether a checked number or distribution can give anything but zero."""
     return any(next(iter(component.values()))) if isinstance(component, dict) else component != 0
-
-
-def _range(parameter: Parameter) -> str:
-    unit = "" if parameter.unit in ("", "1") else f" {parameter.unit}"
-    return f"{parameter.low:g} to {parameter.high:g}{unit}, or a distribution of such values"

@@ -14,6 +14,8 @@ class Parameter:
         default: used where the parameter is left out; None if it must be given.
         size: number of components; 0 for a word.
         nonzero: whether a vector of zeros is refused.
+        integer: whether the value is a whole number.
+        words: allowed words, or "site" or "joint" for the names that the robot has.
     """
 
     name: str
@@ -24,13 +26,15 @@ class Parameter:
     text: str
     size: int = 1
     nonzero: bool = False
+    integer: bool = False
+    words: tuple[str, ...] | str = ()
 
 
 @dataclasses.dataclass(frozen=True)
 class Kind:
     """A disturbance by name. `scalar` names the parameter that a bare number stands for.
 
-    A `repeated` kind takes a list of entries.
+    A `repeated` kind takes a list of entries. Where it names a joint, "all" stands for one entry a joint.
     """
 
     name: str
@@ -40,15 +44,30 @@ class Kind:
     repeated: bool = False
 
 
+ALL = "all"
+NEVER = 1e9  # s
+SHAPES = ("half_sine", "double_hump")
+
+
+def _word(name: str, words: tuple[str, ...] | str, default: str | None, text: str) -> Parameter:
+    return Parameter(name, "", 0, 0, default, text, size=0, words=words)
+
+
+def _time(name: str, default: float | None, text: str) -> Parameter:
+    return Parameter(name, "s", 0.0, NEVER, default, text)
+
+
 KINDS: dict[str, Kind] = {
     kind.name: kind
     for kind in (
         Kind(
             "payload",
-            "A ball fixed to the base from the start of the episode.",
+            "A ball fixed to the base.",
             (
                 Parameter("mass", "kg", 1e-3, 5.0, None, "mass of the ball"),
                 Parameter("position", "m", -0.5, 0.5, (0.0, 0.0, 0.16), "its centre in the base frame", size=3),
+                _time("attach", 0.0, "from when; at 0 the episode starts in balance with it"),
+                _time("drop", NEVER, "until when"),
             ),
             scalar="mass",
         ),
@@ -56,7 +75,7 @@ KINDS: dict[str, Kind] = {
             "push",
             "A constant force for a while, in world axes.",
             (
-                Parameter("body", "", 0, 0, "torso", "named site of the robot at which it acts", size=0),
+                _word("body", "site", "torso", "named site of the robot at which it acts"),
                 Parameter("magnitude", "N", 0.0, 500.0, None, "size of the force"),
                 Parameter(
                     "direction",
@@ -69,10 +88,22 @@ KINDS: dict[str, Kind] = {
                     size=3,
                     nonzero=True,
                 ),
-                Parameter("start", "s", 0.0, 1e5, None, "first instant"),
+                _time("start", None, "first instant"),
                 Parameter("duration", "s", 1e-3, 60.0, 0.2, "how long"),
             ),
             repeated=True,
+        ),
+        Kind(
+            "grf_pulse",
+            "An extra upward force on the foot that lands, from the moment of its contact: the ground reaction model "
+            "of the thesis. The engine has contact forces of its own, so this counts them twice; off by default.",
+            (
+                _word("shape", SHAPES, "half_sine", "A sin(pi x), or A (sin(pi x) + q sin(3 pi x)), x = t / duration"),
+                Parameter("magnitude", "N", 0.0, 500.0, 60.0, "A"),
+                Parameter("duration", "s", 0.005, 2.0, 0.1, "how long; for a double hump the stance, about 1 s"),
+                Parameter("q", "1", -1.0, 1.0, 0.4, "depth between the humps"),
+            ),
+            scalar="magnitude",
         ),
         Kind(
             "friction",
@@ -80,5 +111,95 @@ KINDS: dict[str, Kind] = {
             (Parameter("coefficient", "1", 0.01, 2.0, None, "instead of the nominal 0.8"),),
             scalar="coefficient",
         ),
+        Kind(
+            "slope",
+            "A slope; gravity is tilted, so that heights and angles are measured from the ground.",
+            (
+                Parameter("pitch_deg", "deg", -20.0, 20.0, 0.0, "above zero the ground rises ahead"),
+                Parameter("roll_deg", "deg", -20.0, 20.0, 0.0, "above zero the ground rises to the left"),
+            ),
+            scalar="pitch_deg",
+        ),
+        Kind(
+            "sensor_noise",
+            "White Gaussian noise on measurements, by standard deviation.",
+            (
+                Parameter("position", "rad", 0.0, 0.1, 0.0, "joint angles"),
+                Parameter("velocity", "rad/s", 0.0, 10.0, 0.0, "joint velocities"),
+                Parameter("tilt", "rad", 0.0, 0.5, 0.0, "roll and pitch of the base"),
+                Parameter("angular_velocity", "rad/s", 0.0, 10.0, 0.0, "of the base"),
+            ),
+            scalar="position",
+        ),
+        Kind(
+            "encoder_bits",
+            "Joint encoders of so many counts a turn; joint velocities are then differences of counts.",
+            (Parameter("bits", "1", 6, 32, None, "2^bits counts a turn", integer=True),),
+            scalar="bits",
+        ),
+        Kind(
+            "torque_delay",
+            "Commands act late.",
+            (Parameter("samples", "1", 0, 100, None, "by so many control periods", integer=True),),
+            scalar="samples",
+        ),
+        Kind(
+            "motor_lag",
+            "Torques follow commands as a first-order lag.",
+            (Parameter("time_constant", "s", 0.0, 1.0, None, "of the lag"),),
+            scalar="time_constant",
+        ),
+        Kind(
+            "actuator_loss",
+            "A joint gives a share of the commanded torque only.",
+            (
+                _word("joint", "joint", None, f"which one, or {ALL!r}"),
+                Parameter("factor", "1", 0.0, 1.0, 0.0, "share that is left"),
+                _time("start", 0.0, "from when"),
+            ),
+            repeated=True,
+        ),
+        Kind(
+            "mass_error",
+            "All links are heavier or lighter than the nominal model, inertia included.",
+            (Parameter("factor", "1", 0.5, 2.0, None, "true over nominal mass"),),
+            scalar="factor",
+        ),
+        Kind(
+            "initial_pose",
+            "The episode starts off the reference pose.",
+            (
+                _word("joint", "joint", ALL, f"which one, or {ALL!r}"),
+                Parameter("offset", "rad", -0.5, 0.5, None, "added to the reference angle"),
+            ),
+            repeated=True,
+        ),
     )
 }
+
+
+def schema() -> str:
+    """All kinds and parameters as Markdown, from the tables that check them."""
+    lines = []
+    for kind in KINDS.values():
+        lines += [f"### `{kind.name}`", "", kind.text, "", "| parameter | unit | allowed | default | meaning |"]
+        lines += ["|---|---|---|---|---|"]
+        for parameter in kind.parameters:
+            default = "required" if parameter.default is None else f"`{parameter.default}`"
+            text = parameter.text + (" (what a bare number stands for)" if parameter.name == kind.scalar else "")
+            row = (f"`{parameter.name}`", parameter.unit, allowed(parameter), default, text)
+            lines.append("| " + " | ".join(row) + " |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def allowed(parameter: Parameter) -> str:
+    """What a parameter accepts, in words."""
+    if isinstance(parameter.words, str):
+        return f"a {parameter.words} of the robot"
+    if parameter.words:
+        return ", ".join(parameter.words)
+    unit = "" if parameter.unit in ("", "1") else f" {parameter.unit}"
+    number = "whole numbers " if parameter.integer else ""
+    each = f"{parameter.size} numbers, each " if parameter.size > 1 else ""
+    return f"{each}{number}{parameter.low:g} to {parameter.high:g}{unit}, or a distribution of such values"

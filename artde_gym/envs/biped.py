@@ -1,9 +1,10 @@
-"""`BipedWalk-Payload-v0`: Ojas walks along a given pattern under joint torques."""
+"""Ojas walks along a given pattern under joint torques: what all its tasks share."""
 
 from __future__ import annotations
 
+import inspect
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Literal
 
 import gymnasium as gym
@@ -12,10 +13,15 @@ from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
+from artde_gym.disturbances.actuation import Actuation
+from artde_gym.disturbances.ground import LOADED, GrfPulse
+from artde_gym.disturbances.schedule import Schedule
+from artde_gym.disturbances.sensing import Sensing
 from artde_gym.errors import ActionError, OptionError
 from artde_gym.layout import Field, Layout
 from artde_gym.references.walking import WalkingPattern, hip_height_above_ankle, walking_pattern
 from artde_gym.robots import ojas as robot
+from artde_gym.robots.dynamics import GRAVITY
 from artde_gym.robots.ojas import ActuatorInertia, ojas
 from artde_gym.robots.support import Supported
 from artde_gym.sim.engine import Camera, Engine, State
@@ -28,7 +34,6 @@ FALL_HEIGHT = 0.25  # m, of the base; the hips walk at 0.395 m or higher
 SETTLE = 0.3  # s, before the first step, for feet and payload to come to rest
 SETTLE_STIFFNESS = 420.0  # Nm/rad: what TDE at 1 ms has, Kd m_bar / L
 SETTLE_DAMPING = 10.0  # Nm s/rad
-CONTACT_FORCE = 1.0  # N, from which on a foot counts as loaded
 MAX_SPEED = 200.0  # rad/s, bound of observed joint speeds
 
 N_JOINTS = 12
@@ -57,10 +62,13 @@ OBSERVATION = Layout(
         Field("phase", 1, "1", 0.0, 1.0, "progress within a stride of two steps; 0 while standing"),
     )
 )
+GROUND_FORCE = Field(
+    "ground_force", 6, "N", -1e4, 1e4, "force of the ground on the left and the right foot, world axes"
+)
 ACTION = Layout(
     (Field("tau", N_JOINTS, "Nm", -robot.TORQUE_LIMIT, robot.TORQUE_LIMIT, "leg joint torques, left then right"),)
 )
-_Q, _Q_REF = OBSERVATION["q"], OBSERVATION["q_ref"]
+FOOT_SITES = ("left_foot", "right_foot")
 
 REWARD_SCALES: dict[str, float] = {
     "alive": 1.0,
@@ -69,73 +77,83 @@ REWARD_SCALES: dict[str, float] = {
     "effort": -0.05,
     "smoothness": -0.05,
 }
-"""The reward of a control period L is L times the sum of these scales times their terms (see `BipedWalkPayloadEnv`)."""
+"""The reward of a control period L is L times the sum of these scales times their terms (see `TASK_DOCUMENTATION`)."""
+
+TASK_DOCUMENTATION = """\
+## Action
+`Box(-40, 40, (12,), float64)`, joint torques in Nm, left leg then right leg, each q1..q6 = hip yaw, hip roll, hip
+pitch, knee, ankle pitch, ankle roll. Held for one control period; clipped to the bounds. Use Gymnasium's
+`RescaleAction` for [-1, 1].
+
+## Observation
+{observation}
+
+`tau_applied` is what really acted, after saturation: the time-delay estimate needs just that.
+
+## Reward
+Over a control period L, L times the sum of scale x term; each term is in `info["reward_terms"]`:
+
+| term | scale | value |
+|---|---|---|
+| `alive` | 1 | 1 |
+| `tracking` | 2 | exp(-|e|^2 / 0.02), e = q_ref - q in rad |
+| `upright` | 0.5 | exp(-tilt^2 / 0.05) |
+| `effort` | -0.05 | mean of (tau / 40 Nm)^2 |
+| `smoothness` | -0.05 | mean of (change of tau / 40 Nm)^2 |
+
+A walk of 58 s without an error earns a little under 203.
+
+## Start
+The robot stands on both feet in the pattern's first pose, at rest, in balance with its payload.
+
+## End
+*Terminated* when it has fallen: tilt above 35 degrees (`info["fall_reason"] == "tilt"`) or base below 0.25 m
+(`"height"`). *Truncated* at the end of the walk.
+
+## Arguments
+| name | default | allowed | meaning |
+|---|---|---|---|
+| `disturbances` | {default} | see `artde_gym.disturbances` | what happens besides; `{{}}` for nothing |
+| `control_period` | 0.001 | whole multiples of 0.001 s up to 0.05 | time between two actions, L |
+| `actuator_inertia` | "rotor" | "rotor", "lumped", "none" | geared rotors, discs (3x faster), nothing |
+| `arms` | "fixed" | "fixed", "revolute" | all 20 joints with "revolute": arms held by motors |
+| `speed` | 0.1 | 0 to 0.25 m/s | walking speed |
+| `step_duration` | 1.0 | 0.6 to 2 s | time of one step |
+| `duration` | 58.0 | from 0.1 s | length of the walk |
+| `observe_ground_force` | False | False, True | append the ground's force on each foot to the observation |
+| `engine` | "bullet" | "bullet" | physics engine |
+
+`reset(options={{"disturbances": ..., "scenario": "S2"}})` replaces the disturbances of this and the following
+episodes, by a mapping or by those of a named scenario.
+
+## Info
+`time_s`, `reward_terms`, `foot_loads` (normal force on each foot, N); at reset `disturbances` (realised values, as
+the grammar writes them); `events` when a push or a payload begins or ends; after a fall `fall_reason`.
+"""
+"""Sections of a task's documentation that are the same for all; `{observation}` and `{default}` are filled in."""
 
 
-class BipedWalkPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
-    """Ojas, a 20-joint humanoid of 8.986 kg and 0.94 m, walks with a payload on its torso.
+class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
+    """What all tasks of Ojas share; a subclass says what disturbs the walk by default.
 
-    ## Description
-    A walking pattern (stand 2 s, walk, stop) gives a reference for the twelve leg joints; the policy gives their
-    torques. What the policy does not see: payload, pushes, friction. After section 2.5 of Dantu, *Adaptive Artificial
-    Time Delay Control for Robotic Systems* (2023); the robot's mass distribution and the pattern are ours.
+    Args:
+        disturbances: in place of the task's own; see `artde_gym.disturbances`.
+        control_period: time between two actions (s), a whole multiple of the physics' 0.001 s.
+        actuator_inertia: see `artde_gym.robots.ojas`.
+        arms: see `artde_gym.robots.ojas`.
+        speed: see `artde_gym.references.walking`, also for `step_duration` and `duration`.
+        observe_ground_force: whether the observation ends with the ground's force on each foot.
+        engine: physics engine.
+        render_mode: "rgb_array" or None.
 
-    ## Action
-    `Box(-40, 40, (12,), float64)`, joint torques in Nm, left leg then right leg, each q1..q6 = hip yaw, hip roll, hip
-    pitch, knee, ankle pitch, ankle roll. Held for one control period; clipped to the bounds. Use Gymnasium's
-    `RescaleAction` for [-1, 1].
-
-    ## Observation
-    {observation}
-
-    `tau_applied` is what really acted, after saturation: the time-delay estimate needs just that.
-
-    ## Reward
-    Over a control period L, L times the sum of scale x term; each term is in `info["reward_terms"]`:
-
-    | term | scale | value |
-    |---|---|---|
-    | `alive` | 1 | 1 |
-    | `tracking` | 2 | exp(-|e|^2 / 0.02), e = q_ref - q in rad |
-    | `upright` | 0.5 | exp(-tilt^2 / 0.05) |
-    | `effort` | -0.05 | mean of (tau / 40 Nm)^2 |
-    | `smoothness` | -0.05 | mean of (change of tau / 40 Nm)^2 |
-
-    A walk of 58 s without an error earns a little under 203.
-
-    ## Start
-    The robot stands on both feet in the pattern's first pose, at rest, in balance with its payload.
-
-    ## End
-    *Terminated* when it has fallen: tilt above 35 degrees (`info["fall_reason"] == "tilt"`) or base below 0.25 m
-    (`"height"`). *Truncated* at the end of the walk.
-
-    ## Arguments
-    | name | default | allowed | meaning |
-    |---|---|---|---|
-    | `disturbances` | payload of 1.3 kg | see `artde_gym.disturbances` | what happens besides; `{{}}` for nothing |
-    | `control_period` | 0.001 | whole multiples of 0.001 s up to 0.05 | time between two actions, L |
-    | `actuator_inertia` | "rotor" | "rotor", "lumped", "none" | geared rotors, discs (3x faster), nothing |
-    | `arms` | "fixed" | "fixed", "revolute" | all 20 joints with "revolute": arms held by motors |
-    | `speed` | 0.1 | 0 to 0.25 m/s | walking speed |
-    | `step_duration` | 1.0 | 0.6 to 2 s | time of one step |
-    | `duration` | 58.0 | from 0.1 s | length of the walk |
-    | `engine` | "bullet" | "bullet" | physics engine |
-
-    `reset(options={{"disturbances": ..., "scenario": "S2"}})` replaces the disturbances of this and the following
-    episodes, by a mapping or by those of a named scenario.
-
-    ## Info
-    `time_s`, `reward_terms`; at reset `disturbances` (realised values, as the grammar writes them); after a fall
-    `fall_reason`.
-
-    ## Versions
-    * v0: first version.
+    Raises:
+        OptionError: for an argument out of range.
+        DisturbanceError: for a malformed disturbance.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}
 
-    observation_layout = OBSERVATION
+    default_disturbances: ClassVar[Mapping[str, Any]] = {}
     action_layout = ACTION
     robot_name = "ojas"
     reported_axes: ClassVar[dict[str, int]] = {f"q{i + 1}": N_JOINTS // 2 + i for i in range(N_JOINTS // 2)}
@@ -151,6 +169,7 @@ class BipedWalkPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         speed: float = 0.1,
         step_duration: float = 1.0,
         duration: float = 58.0,
+        observe_ground_force: bool = False,
         engine: EngineName = "bullet",
         render_mode: Literal["rgb_array"] | None = None,
     ) -> None:
@@ -160,45 +179,40 @@ class BipedWalkPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         self.nominal_robot = ojas(actuator_inertia)
         model = ojas(actuator_inertia, arms=arms)
         self._sites = [name for name, _, _ in model.sites]
-        self._disturbances = self._parse({"payload": 1.3} if disturbances is None else disturbances)
+        self._disturbances = self._parse(self.default_disturbances if disturbances is None else disturbances)
         self._substeps = _substeps(control_period)
         self.control_period = self._substeps * TIME_STEP
         self._engine: Engine = make_engine(engine, model, TIME_STEP)
         self.pattern = walking_pattern(speed, step_duration, duration, TIME_STEP)
         self._plan = _plan(self.pattern, self._substeps)
         self._last = len(self._plan) - 1
-        self.observation_space = OBSERVATION.box()
+        self.observe_ground_force = observe_ground_force
+        self.observation_layout = Layout((*OBSERVATION.fields, GROUND_FORCE)) if observe_ground_force else OBSERVATION
+        self.observation_space = self.observation_layout.box()
         self.action_space = ACTION.box()
-        hip_height = robot.ANKLE_HEIGHT + hip_height_above_ankle(speed, step_duration)
-        self._engine.set_friction(FRICTION)
-        self._engine.place((float(self.pattern.base[0, 0]), 0.0, hip_height), self.pattern.q[0])
+        hip_height = robot.ANKLE_HEIGHT + hip_height_above_ankle(speed)
         start, rest = self.pattern.q[0], np.zeros(N_JOINTS)
         self._stand = Supported(self.nominal_robot).torque(0.5, start, rest, rest)
-        self._still = self._settle()
+        self._engine.set_friction(FRICTION)
+        self._engine.place((float(self.pattern.base[0, 0]), 0.0, hip_height), start)
+        self._still = self._settle(start)
         self._settled = self._engine.snapshot()
         self._k = self._last  # no step before the first reset
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
-        """Start a walk; see the class for the options.
+        """Start a walk; `options` are those of the class' documentation.
 
         Raises:
-            OptionError: for an unknown option.
+            OptionError: for an unknown option, or a scenario that needs another environment.
             DisturbanceError: for a malformed disturbance.
         """
         super().reset(seed=seed)
         self._read_options(options or {})
         realised = self._disturbances.draw(self.np_random)
-        self._engine.restore(self._settled)
-        self._engine.set_friction(realised.get("friction", {}).get("coefficient", FRICTION))
-        self._pushes = [_Push(entry) for entry in realised.get("push", ())]
-        self._tau = self._still
-        if "payload" in realised:
-            payload = realised["payload"]
-            self._engine.attach_payload(payload["mass"], tuple(payload["position"]))
-            self._tau = self._settle()
         self._k = 0
-        self._state = self._engine.read()
-        return self._observe(), {"time_s": 0.0, "disturbances": realised}
+        self._tau = self._begin(realised)
+        info: dict[str, Any] = {"time_s": 0.0, "disturbances": realised}
+        return self._measure(info), info
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Apply joint torques for one control period.
@@ -214,18 +228,15 @@ class BipedWalkPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
             raise ActionError("shape of the action", action.shape, f"({N_JOINTS},)")
         if not math.isfinite(action.dot(action)):
             raise ActionError("action", action.tolist(), "finite torques (Nm)")
-        previous, self._tau = self._tau, np.minimum(np.maximum(action, -robot.TORQUE_LIMIT), robot.TORQUE_LIMIT)
-        for substep in range(self._k * self._substeps, (self._k + 1) * self._substeps):
-            for push in self._pushes:
-                if push.first <= substep < push.end:
-                    self._engine.push(push.site, push.force)
-            self._engine.step(self._tau)
+        previous = self._tau
+        events = self._simulate(np.minimum(np.maximum(action, -robot.TORQUE_LIMIT), robot.TORQUE_LIMIT))
         self._k += 1
-        self._state = self._engine.read()
-        observation = self._observe()
-        terms = self._reward_terms(observation, previous)
+        info: dict[str, Any] = {"time_s": self._k * self.control_period}
+        observation = self._measure(info)
+        terms = info["reward_terms"] = self._reward_terms(previous)
         reward = self.control_period * sum([REWARD_SCALES[name] * value for name, value in terms.items()])
-        info: dict[str, Any] = {"time_s": self._k * self.control_period, "reward_terms": terms}
+        if events:
+            info["events"] = events
         fall = self._fall()
         if fall:
             info["fall_reason"] = fall
@@ -242,7 +253,7 @@ class BipedWalkPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         self._engine.close()
 
     def _parse(self, disturbances: Mapping[str, Any]) -> Disturbances:
-        return Disturbances.parse(disturbances, self._sites)
+        return Disturbances.parse(disturbances, self._sites, self.nominal_robot.actuated)
 
     def _read_options(self, options: Mapping[str, Any]) -> None:
         for key in options:
@@ -259,29 +270,79 @@ class BipedWalkPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         if options.get("disturbances") is not None:
             self._disturbances = self._parse(options["disturbances"])
 
-    def _settle(self) -> Array:
+    def _begin(self, realised: Mapping[str, Any]) -> Array:
+        """Set an episode up and let the robot come to rest in it; returns the joint torques in the end."""
+        engine, joints = self._engine, self.nominal_robot.actuated
+        engine.restore(self._settled)
+        engine.set_friction(realised.get("friction", {}).get("coefficient", FRICTION))
+        engine.set_gravity(_gravity(**realised.get("slope", {})))
+        engine.scale_masses(realised.get("mass_error", {}).get("factor", 1.0))
+        self._schedule = Schedule(realised, TIME_STEP)
+        self._schedule.start(engine)
+        self._pulse = GrfPulse(realised["grf_pulse"], TIME_STEP) if "grf_pulse" in realised else None
+        pose = self.pattern.q[0].copy()
+        for entry in realised.get("initial_pose", ()):
+            pose[joints.index(entry["joint"])] += entry["offset"]
+        at_rest = realised.keys().isdisjoint(("payload", "friction", "slope", "mass_error", "initial_pose"))
+        tau = self._still if at_rest else self._settle(pose)
+        self._actuation = self._sensing = None
+        if not realised.keys().isdisjoint(Actuation.KINDS):
+            self._actuation = Actuation(realised, joints, TIME_STEP)
+            self._actuation.start(tau)
+        if not realised.keys().isdisjoint(Sensing.KINDS):
+            self._sensing = Sensing(realised, OBSERVATION, self.control_period, self.np_random)
+        return tau
+
+    def _settle(self, pose: Array) -> Array:
         """Stand still under springs on the joints; returns the torques in the end.
 
         Springs share the load of the two legs evenly. A rigid hold would not: the legs and the ground are a closed
         chain, in which any start error turns into antagonistic torques of several Nm.
         """
-        q0, tau = self.pattern.q[0], self._stand
+        tau = self._stand
         for _ in range(round(SETTLE / TIME_STEP)):
             state = self._engine.read()
-            tau = self._stand + SETTLE_STIFFNESS * (q0 - state.q) - SETTLE_DAMPING * state.qd
+            tau = self._stand + SETTLE_STIFFNESS * (pose - state.q) - SETTLE_DAMPING * state.qd
             self._engine.step(tau)
         return np.clip(tau, -robot.TORQUE_LIMIT, robot.TORQUE_LIMIT)
 
-    def _observe(self) -> Array:
-        state, plan = self._state, self._plan[self._k]
-        left, right = self._engine.foot_loads()
-        self._tilt = roll, pitch = _roll_pitch(state)
-        contact = (left > CONTACT_FORCE, right > CONTACT_FORCE)
-        base = (state.position[2], roll, pitch, *state.velocity, *state.angular_velocity, *contact)
-        return np.concatenate([state.q, state.qd, plan[:-2], self._tau, base, plan[-2:]])
+    def _simulate(self, command: Array) -> list[str]:
+        """Let `command` act for one control period, with what disturbs it; returns what began or ended meanwhile."""
+        engine, first = self._engine, self._k * self._substeps
+        events: list[str] = []
+        actuation, applied = self._actuation, command
+        target = command if actuation is None else actuation.target(command)
+        total = np.zeros(N_JOINTS)
+        for step in range(first, first + self._substeps):
+            events += self._schedule.apply(step, engine)
+            if self._pulse is not None:
+                for site, force in zip(FOOT_SITES, self._pulse.forces(engine.foot_loads()), strict=True):
+                    if force:
+                        engine.push(site, (0.0, 0.0, force))
+            if actuation is not None:
+                applied = actuation.advance(target, step)
+                total = total + applied
+            engine.step(applied)
+        # the mean torque of the period belongs to its mean acceleration
+        self._tau = command if actuation is None else total / self._substeps
+        return events
 
-    def _reward_terms(self, observation: Array, previous: Array) -> dict[str, float]:
-        error = observation[_Q_REF] - observation[_Q]
+    def _measure(self, info: dict[str, Any]) -> Array:
+        """Read the engine; returns the observation and puts into `info` what policies are not meant to see."""
+        state = self._state = self._engine.read()
+        loads = info["foot_loads"] = self._engine.foot_loads()
+        self._tilt = _roll_pitch(state)
+        contact = [load > LOADED for load in loads]
+        plan = self._plan[self._k]
+        base = (state.position[2], *self._tilt, *state.velocity, *state.angular_velocity, *contact)
+        parts = [state.q, state.qd, plan[:-2], self._tau, base, plan[-2:]]
+        if self.observe_ground_force:
+            parts.append(self._engine.ground_forces().ravel())
+        observation = np.concatenate(parts)
+        return observation if self._sensing is None else self._sensing.disturb(observation)
+
+    def _reward_terms(self, previous: Array) -> dict[str, float]:
+        error = self._plan[self._k, :N_JOINTS] - self._state.q
         change = self._tau - previous
         roll, pitch = self._tilt
         return {
@@ -302,23 +363,15 @@ class BipedWalkPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         return None
 
 
-BipedWalkPayloadEnv.__doc__ = str(BipedWalkPayloadEnv.__doc__).format(observation=OBSERVATION.table())
-
 _COS_FALL = math.cos(math.radians(FALL_TILT_DEG))
 _EFFORT_SCALE = 1.0 / (N_JOINTS * robot.TORQUE_LIMIT**2)
 
 
-class _Push:
-    """A push in physics steps: acts from `first` up to, not including, `end`."""
-
-    def __init__(self, entry: Mapping[str, Any]) -> None:
-        self.site: str = entry["body"]
-        direction = np.asarray(entry["direction"])
-        direction = direction / np.abs(direction).max()  # so that the squares of tiny components do not vanish
-        x, y, z = (entry["magnitude"] * direction / np.linalg.norm(direction)).tolist()
-        self.force = (x, y, z)
-        self.first = round(entry["start"] / TIME_STEP)
-        self.end = self.first + max(1, round(entry["duration"] / TIME_STEP))
+def _gravity(pitch_deg: float = 0.0, roll_deg: float = 0.0) -> tuple[float, float, float]:
+    """Free fall in the axes of a ground that rises by `pitch_deg` ahead and by `roll_deg` to the left."""
+    ahead, left = math.tan(math.radians(pitch_deg)), math.tan(math.radians(roll_deg))
+    size = GRAVITY / math.sqrt(1.0 + ahead * ahead + left * left)
+    return (-size * ahead, -size * left, -size)
 
 
 def _substeps(control_period: float) -> int:
@@ -342,3 +395,15 @@ def _roll_pitch(state: State) -> tuple[float, float]:
     roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
     pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
     return roll, pitch
+
+
+def document(default: str) -> Callable[[type[BipedEnv]], type[BipedEnv]]:
+    """Class decorator: fill the sections that all tasks share into a docstring, at `{shared}`."""
+
+    def filled(task: type[BipedEnv]) -> type[BipedEnv]:
+        own = inspect.cleandoc(str(task.__doc__))
+        shared = TASK_DOCUMENTATION.format(observation=OBSERVATION.table(), default=default)
+        task.__doc__ = own.format(shared=shared)
+        return task
+
+    return filled

@@ -23,6 +23,7 @@ METRICS = {
 }
 REFERENCE = "artde"
 """The controller that all others are compared with, if it was evaluated: the claims are about this one."""
+TOGETHER = 3  # columns of controllers, or of comparisons, that fit a terminal
 
 
 def print_result(result: Result, console: Console) -> None:
@@ -50,7 +51,8 @@ def _scenario(result: Result, summary: pd.DataFrame, scenario: str) -> Group:
         note += f"; thesis: {thesis.TABLES[reference]}"
     parts: list[RenderableType] = [title, Text(note, style="dim"), _falls(result, scenario, reference)]
     axes = [name.removeprefix("rmse_deg_") for name in result.metrics if name.startswith("rmse_deg_")]
-    parts += [_metric(result, summary, scenario, reference, metric, axes) for metric in METRICS]
+    for metric in METRICS:
+        parts += _metric(result, summary, scenario, reference, metric, axes)
     return Group(*parts)
 
 
@@ -80,26 +82,32 @@ def _thesis_fall(reference: str | None, controller: str) -> str:
 
 def _metric(
     result: Result, summary: pd.DataFrame, scenario: str, reference: str | None, metric: str, axes: list[str]
-) -> Table:
-    """Two rows an axis, ours and the thesis': one column a controller, one a comparison with the reference."""
+) -> list[Table]:
+    """Two rows an axis, ours and the thesis'. Few controllers and their comparisons share one table."""
     controllers = result.controllers
     rivals = [name for name in controllers if name != REFERENCE] if REFERENCE in controllers else []
     comparisons = {rival: result.compare(REFERENCE, rival).to_dict(orient="index") for rival in rivals}
     means: dict[Any, float] = summary["mean"].to_dict()
-    table = _table("axis", "", title=METRICS[metric])
-    for name in (*controllers, *(f"{REFERENCE} vs {rival} (%)" for rival in rivals)):
-        table.add_column(name, justify="right")
-    for axis in axes:
-        column = f"{metric}_{axis}"
-        ours = [f"{means[scenario, name, column]:.3f}" for name in controllers]
-        ours += [_comparison(comparisons[rival][scenario, column]) for rival in rivals]
-        table.add_row(axis, "ours", *ours)
-        theirs = [thesis.value(reference, name, metric, axis) for name in controllers]
-        if any(value is not None for value in theirs):
-            cells = ["" if value is None else f"{value:.3f}" for value in theirs]
-            cells += [_change(reference, metric, axis, rival) for rival in rivals]
-            table.add_row("", "thesis", *cells, style="dim")
-    return table
+
+    def table(shown: list[str], compared: list[str]) -> Table:
+        part = _table("axis", "", title=METRICS[metric])
+        for name in (*shown, *(f"{REFERENCE} vs {rival} (%)" for rival in compared)):
+            part.add_column(name, justify="right")
+        for axis in axes:
+            column = f"{metric}_{axis}"
+            ours = [f"{means[scenario, name, column]:.3f}" for name in shown]
+            ours += [_comparison(comparisons[rival][scenario, column]) for rival in compared]
+            part.add_row(axis, "ours", *ours)
+            theirs = [_number(thesis.value(reference, name, metric, axis)) for name in shown]
+            theirs += [_change(reference, metric, axis, rival) for rival in compared]
+            if any(theirs):
+                part.add_row("", "thesis", *theirs, style="dim")
+        return part
+
+    if len(controllers) <= TOGETHER:
+        return [table(controllers, rivals)]
+    pairs = [rivals[i : i + TOGETHER] for i in range(0, len(rivals), TOGETHER)]
+    return [table(controllers, []), *(table([], pair) for pair in pairs)]
 
 
 def _table(*columns: str, title: str) -> Table:
@@ -121,6 +129,10 @@ def _change(reference: str | None, metric: str, axis: str, rival: str) -> str:
 
 def _span(low: float, high: float, digits: int) -> str:
     return f"({low:.{digits}f}..{high:.{digits}f})" if math.isfinite(low) else ""
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.3f}"
 
 
 def _percent(value: float) -> str:

@@ -30,6 +30,7 @@ from artde_gym.evaluation.scenarios import scenario as find_scenario
 from artde_gym.evaluation.store import Store
 from artde_gym.registration import ControllerSpec, make_controller, register_spec, registered_controllers
 
+DEFAULT_ENVIRONMENT = "BipedWalk-Payload-v0"
 CUSTOM = "custom"
 """Name of the scenario when an environment is evaluated as it is."""
 
@@ -42,6 +43,7 @@ class Cell(NamedTuple):
     name: str
     env_id: str
     kwargs: dict[str, Any]
+    phases: tuple[tuple[float, float], ...] = ()
 
 
 class Task(NamedTuple):
@@ -68,7 +70,7 @@ class Update(NamedTuple):
 
 def evaluate(
     controllers: Sequence[str | Policy] | Mapping[str, str | Policy],
-    env_id: str = "BipedWalk-Payload-v0",
+    env_id: str | None = None,
     *,
     scenario: str | Sequence[str] | None = None,
     episodes: int = 20,
@@ -86,7 +88,7 @@ def evaluate(
     Args:
         controllers: registered names, or policies with Stable-Baselines3's `predict` (listed under their `name`, else
             their class); as a mapping, under its keys.
-        env_id: any registered environment of this project; a scenario must belong to it.
+        env_id: any registered environment of this project. Scenarios bring their own; with one, it must be theirs.
         scenario: one or several names of `artde_gym.evaluation.scenarios`; None for the environment as it is.
         episodes: of each controller in each scenario.
         seed: of the whole evaluation; episode i has the same seed for every controller and scenario.
@@ -130,7 +132,7 @@ def evaluate(
     store = None
     if out is not None:
         configuration = {
-            "cells": [cell._asdict() for cell in cells],
+            "cells": [{"name": cell.name, "env_id": cell.env_id, "kwargs": cell.kwargs} for cell in cells],
             "controllers": {name: _identity(policy) for name, policy in named.items()},
             "gains": gains,
             "episodes": episodes,
@@ -206,21 +208,25 @@ def _named(controllers: Any) -> dict[str, Policy | ControllerSpec]:
 
 
 def _cells(
-    env_id: str, names: str | Sequence[str] | None, kwargs: dict[str, Any], disturbances: Mapping[str, Any] | None
+    env_id: str | None,
+    names: str | Sequence[str] | None,
+    kwargs: dict[str, Any],
+    disturbances: Mapping[str, Any] | None,
 ) -> list[Cell]:
     if names is None:
         own = {} if disturbances is None else {"disturbances": dict(disturbances)}
-        return [Cell(CUSTOM, env_id, {**kwargs, **own})]
+        return [Cell(CUSTOM, env_id or DEFAULT_ENVIRONMENT, {**kwargs, **own})]
     entries: list[Scenario] = [find_scenario(name) for name in ([names] if isinstance(names, str) else names)]
     if not entries:
         raise OptionError("scenario", names, "at least one name, or None")
     for entry in entries:
-        if entry.env_id != env_id:
+        if env_id not in (None, entry.env_id):
             raise OptionError(f"environment of scenario {entry.name!r}", env_id, repr(entry.env_id))
-    return [
-        Cell(entry.name, env_id, {**entry.kwargs, **kwargs, "disturbances": dict(disturbances or entry.disturbances)})
-        for entry in entries
-    ]
+    cells = []
+    for entry in entries:
+        chosen = dict(entry.disturbances if disturbances is None else disturbances)
+        cells.append(Cell(entry.name, entry.env_id, {**entry.kwargs, **kwargs, "disturbances": chosen}, entry.phases))
+    return cells
 
 
 def _try_out(cells: list[Cell], named: Mapping[str, Any], gains: Mapping[str, dict[str, Any]]) -> None:
@@ -326,7 +332,7 @@ def _run_in_worker(index: int, task: Task) -> Episode:
 def _run_task(task: Task, on_progress: Callable[[float], None]) -> Episode:
     env = _environment(task.cell.env_id, json.dumps(task.cell.kwargs))
     policy = _policy(task.policy, env, task.gains)
-    return run_episode(env, policy, task.seed, trace_hz=task.trace_hz, on_progress=on_progress)
+    return run_episode(env, policy, task.seed, trace_hz=task.trace_hz, phases=task.cell.phases, on_progress=on_progress)
 
 
 def _policy(item: Policy | ControllerSpec, env: Any, gains: dict[str, Any]) -> Policy:

@@ -26,6 +26,7 @@ class Recording:
         axes: reported axis -> its column in q.
         mass: of the robot with its payload (kg).
         pushes: (start, end) of each push (s).
+        phases: (start, end) of parts that are measured one by one too (s).
         sigma: TDE errors at the trace's rate, (samples, n); None for a policy without.
     """
 
@@ -35,13 +36,15 @@ class Recording:
     axes: Mapping[str, int]
     mass: float
     pushes: tuple[tuple[float, float], ...] = ()
+    phases: tuple[tuple[float, float], ...] = ()
     sigma: Array | None = None
 
 
 def episode_metrics(recording: Recording) -> dict[str, Any]:
     """All metrics of section "Metrics" of the documentation, by column name.
 
-    Per axis: `rmse_deg`, `max_abs_error_deg`, `rms_torque_nm`. Per episode, over all joints:
+    Per axis: `rmse_deg`, `max_abs_error_deg`, `rms_torque_nm`; the same with `_phase1`, ... for each phase. Per
+    episode, over all joints:
 
     - `rmse_deg`: root of the mean square error over joints and time.
     - `iae_deg_s`, `itae_deg_s2`: integral of the mean absolute error, and of time times it.
@@ -60,11 +63,10 @@ def episode_metrics(recording: Recording) -> dict[str, Any]:
     power = np.abs(torque * fields["qd"][1:]).sum(axis=1)
     energy = float(power.sum() * period)
     distance = float(fields["base_velocity"][:, 0].sum() * period)
-    metrics: dict[str, Any] = {}
-    for axis, column in recording.axes.items():
-        metrics[f"rmse_deg_{axis}"] = float(np.degrees(_rms(error[:, column])))
-        metrics[f"max_abs_error_deg_{axis}"] = float(np.degrees(np.abs(error[:, column]).max()))
-        metrics[f"rms_torque_nm_{axis}"] = _rms(torque[:, column])
+    metrics = _axis_metrics(recording, 0, len(error), "")
+    for number, (start, end) in enumerate(recording.phases, start=1):
+        last = len(error) if end == float("inf") else round(end / period)
+        metrics |= _axis_metrics(recording, round(start / period), last, f"phase{number}_")
     sigma = recording.sigma
     return metrics | {
         "rmse_deg": float(np.degrees(_rms(error))),
@@ -79,6 +81,20 @@ def episode_metrics(recording: Recording) -> dict[str, Any]:
             (recovery_time(error, period, *push) for push in recording.pushes), default=float("nan")
         ),
     }
+
+
+def _axis_metrics(recording: Recording, first: int, last: int, prefix: str) -> dict[str, Any]:
+    """Metrics of each reported axis over the samples [first, last); NaN for a part that the episode did not reach."""
+    error = recording.fields["q_ref"][first:last] - recording.fields["q"][first:last]
+    torque = recording.fields["tau_applied"][max(first, 1) : last]  # of the period that ends with its sample
+    metrics: dict[str, Any] = {}
+    for axis, column in recording.axes.items():
+        reached = len(error) > 0
+        peak = np.abs(error[:, column]).max() if reached else np.nan
+        metrics[f"rmse_deg_{prefix}{axis}"] = float(np.degrees(_rms(error[:, column]))) if reached else np.nan
+        metrics[f"max_abs_error_deg_{prefix}{axis}"] = float(np.degrees(peak))
+        metrics[f"rms_torque_nm_{prefix}{axis}"] = _rms(torque[:, column]) if reached else np.nan
+    return metrics
 
 
 def recovery_time(error: Array, period: float, start: float, end: float) -> float:

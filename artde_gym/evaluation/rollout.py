@@ -37,6 +37,7 @@ def run_episode(
     *,
     options: dict[str, Any] | None = None,
     trace_hz: float = 100.0,
+    phases: tuple[tuple[float, float], ...] = (),
     on_progress: Callable[[float], None] | None = None,
 ) -> Episode:
     """Drive `env` with `policy` from a seeded reset to the end.
@@ -46,6 +47,7 @@ def run_episode(
         seed: of the reset; the same seed has the same disturbances whatever the policy.
         options: of the reset.
         trace_hz: rate of the traces, at most the control rate; infinite for every sample.
+        phases: see `Recording`.
         on_progress: called with the simulated time (s) about once a simulated second.
     """
     plant = env.unwrapped
@@ -82,6 +84,7 @@ def run_episode(
         axes=plant.reported_axes,
         mass=plant.nominal_robot.mass + disturbances.get("payload", {}).get("mass", 0.0),
         pushes=pushes,
+        phases=phases,
         sigma=inside.get("sigma"),
     )
     row = {

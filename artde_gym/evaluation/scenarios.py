@@ -7,9 +7,11 @@ torso of 0.5 to 5 N for 0.2 s at 1 s from any side, friction of 0.7 to 0.9, and 
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from typing import Any
 
+from artde_gym.disturbances.pushes import ARM_PUSH, CHEST_PUSH
 from artde_gym.errors import UnknownNameError, among
 
 _KICK = {
@@ -28,7 +30,12 @@ _PAYLOAD: dict[str, Any] = {
 
 @dataclasses.dataclass(frozen=True)
 class Scenario:
-    """One entry; `thesis` names the thesis' scenario that it stands beside, if any."""
+    """One entry.
+
+    Attributes:
+        thesis: the thesis' scenario that it stands beside, if any.
+        phases: (start, end) (s) of parts that are measured one by one too.
+    """
 
     name: str
     env_id: str
@@ -36,19 +43,27 @@ class Scenario:
     disturbances: Mapping[str, Any]
     text: str
     thesis: str | None = None
+    phases: tuple[tuple[float, float], ...] = ()
 
 
 _WALK = "BipedWalk-Payload-v0"
+_PUSH = "BipedPush-v0"
 _SLOW = {"control_period": 0.004}
 _S2 = {"payload": _PAYLOAD, **_VARIATION}
+_S3 = {**_S2, "push": [_KICK, CHEST_PUSH, ARM_PUSH]}
+_GRF = {**_VARIATION, "grf_pulse": 60.0}
+_PHASES = ((0.0, 28.0), (28.0, 37.0), (37.0, math.inf))
 
 SCENARIOS: dict[str, Scenario] = {
     entry.name: entry
     for entry in (
         Scenario("S1", _WALK, {}, _VARIATION, "walk without payload, L = 1 ms", "S1"),
         Scenario("S2", _WALK, {}, _S2, "walk with a payload of 1.3 kg, L = 1 ms", "S2"),
+        Scenario("S3", _PUSH, {}, _S3, "S2 with pushes of 10 N at 28 s (chest) and 37 s (left arm)", "S3", _PHASES),
         Scenario("S1-L4", _WALK, _SLOW, _VARIATION, "S1 at L = 4 ms: a quarter of the joint stiffness", "S1"),
         Scenario("S2-L4", _WALK, _SLOW, _S2, "S2 at L = 4 ms", "S2"),
+        Scenario("S3-L4", _PUSH, _SLOW, _S3, "S3 at L = 4 ms", "S3", _PHASES),
+        Scenario("S1-GRF", _WALK, {}, _GRF, "S1 with the thesis' extra ground force", "S1"),
     )
 }
 

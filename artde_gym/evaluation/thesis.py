@@ -9,7 +9,7 @@ from __future__ import annotations
 JOINTS = ("q1", "q2", "q3", "q4", "q5", "q6")
 """Right leg: hip yaw, hip roll, hip pitch, knee, ankle pitch, ankle roll."""
 
-TABLES: dict[str, str] = {"S1": "Table 2.1", "S2": "Table 2.2"}
+TABLES: dict[str, str] = {"S1": "Table 2.1", "S2": "Table 2.2", "S3": "Table 2.3"}
 
 _S1 = {
     "tde": {
@@ -35,7 +35,20 @@ _S2 = {
         "rms_torque_nm": (2.826, 4.006, 5.882, 5.657, 7.974, 3.253),
     },
 }
-VALUES: dict[str, dict[str, dict[str, tuple[float, ...]]]] = {"S1": _S1, "S2": _S2}
+_S3 = {
+    "artde": {
+        "rmse_deg_phase1": (0.025, 0.436, 1.460, 2.118, 2.184, 0.763),
+        "rmse_deg_phase2": (0.026, 0.441, 1.456, 2.320, 2.243, 0.862),
+        "rmse_deg_phase3": (0.025, 0.497, 1.462, 2.108, 2.182, 0.770),
+        "max_abs_error_deg_phase1": (0.065, 0.745, 3.142, 5.361, 5.980, 2.008),
+        "max_abs_error_deg_phase2": (0.062, 4.118, 4.008, 7.864, 5.801, 3.061),
+        "max_abs_error_deg_phase3": (0.063, 6.723, 3.802, 5.853, 5.701, 2.893),
+        "rms_torque_nm_phase1": (2.824, 3.924, 5.863, 5.351, 7.78, 4.253),
+        "rms_torque_nm_phase2": (2.912, 4.004, 5.912, 5.801, 7.981, 3.837),
+        "rms_torque_nm_phase3": (2.802, 4.964, 5.904, 5.368, 7.763, 3.568),
+    },
+}
+VALUES: dict[str, dict[str, dict[str, tuple[float, ...]]]] = {"S1": _S1, "S2": _S2, "S3": _S3}
 """scenario -> controller -> metric -> one value a joint."""
 
 TIME_TO_FALL: dict[str, dict[str, float]] = {"S2": {"tde": 26.0, "atde": 31.0}}

@@ -91,6 +91,7 @@ def ojas(actuator_inertia: ActuatorInertia = "rotor", *, arms: Literal["fixed", 
             ("chest", "torso", (0.06, 0.0, 0.22)),
             ("left_arm", "left_shoulder_yaw", (0.0, 0.0, -0.06)),
             ("right_arm", "right_shoulder_yaw", (0.0, 0.0, -0.06)),
+            *((f"{side}_foot", f"{side}_ankle_roll", (FOOT_CENTRE_AHEAD, 0.0, -ANKLE_HEIGHT)) for side in SIDES),
         ),
     ).merged()
     if actuator_inertia == "rotor":

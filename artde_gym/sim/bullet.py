@@ -73,7 +73,11 @@ class BulletEngine:
         self._ground = self._build_ground()
         self._robot = self._build_robot()
         self._com = spec.base.com
-        self._payload: tuple[int, int] | None = None  # body, constraint
+        self._mass_factor = 1.0
+        self._friction: float | None = None
+        self._friction_at: dict[int, float | None] = {}  # of the contacts in each snapshot
+        self._payload: int | None = None  # body
+        self._holder: int | None = None  # constraint
 
     def _build_ground(self) -> int:
         shape = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=self._client)
@@ -129,7 +133,7 @@ class BulletEngine:
         return robot
 
     def place(self, position: Vector, q: Array) -> None:
-        self._detach_payload()
+        self._remove_payload()
         center = np.add(position, self._com).tolist()
         client: dict[str, Any] = {"physicsClientId": self._client}
         bullet.resetBasePositionAndOrientation(self._robot, center, [0.0, 0.0, 0.0, 1.0], **client)
@@ -141,10 +145,15 @@ class BulletEngine:
                 bullet.resetJointState(self._robot, joint, angle.get(name, 0.0), 0.0, **client)
 
     def snapshot(self) -> int:
-        return bullet.saveState(physicsClientId=self._client)
+        handle = bullet.saveState(physicsClientId=self._client)
+        self._friction_at[handle] = self._friction
+        return handle
 
     def restore(self, snapshot: int) -> None:
-        self._detach_payload()  # Bullet restores only a world with the same bodies
+        self._remove_payload()  # Bullet restores only a world with the same bodies
+        friction = self._friction_at[snapshot]
+        if friction is not None:
+            self.set_friction(friction)
         bullet.restoreState(snapshot, physicsClientId=self._client)
 
     def read(self) -> State:
@@ -192,12 +201,41 @@ class BulletEngine:
             loads[point[3]] += point[9]
         return tuple(loads.values())
 
+    def ground_forces(self) -> Array:
+        forces = {foot: np.zeros(3) for foot in self._feet}
+        for point in bullet.getContactPoints(self._robot, self._ground, physicsClientId=self._client):
+            # normal force along the normal, then two friction forces along their directions
+            for size, direction in ((point[9], point[7]), (point[10], point[11]), (point[12], point[13])):
+                forces[point[3]] += size * np.asarray(direction)
+        return np.array(list(forces.values()))
+
+    def set_gravity(self, gravity: Vector) -> None:
+        bullet.setGravity(*gravity, physicsClientId=self._client)
+
+    def scale_masses(self, factor: float) -> None:
+        if factor == self._mass_factor:
+            return
+        for link in self.spec.links:
+            bullet.changeDynamics(
+                self._robot,
+                self._links[link.name],
+                mass=factor * link.mass,
+                localInertiaDiagonal=[factor * moment for moment in link.inertia],  # or Bullet makes up its own
+                physicsClientId=self._client,
+            )
+        self._mass_factor = factor
+
     def set_friction(self, coefficient: float) -> None:
+        if coefficient == self._friction:
+            return
         for foot in self._feet:
             bullet.changeDynamics(self._robot, foot, lateralFriction=coefficient, physicsClientId=self._client)
+            # contact points keep the coefficient that they were born with: new ones, by way of a new broadphase proxy
+            bullet.setCollisionFilterGroupMask(self._robot, foot, 1, -1, physicsClientId=self._client)
+        self._friction = coefficient
 
     def attach_payload(self, mass: float, position: Vector) -> None:
-        self._detach_payload()
+        self._remove_payload()
         client: dict[str, Any] = {"physicsClientId": self._client}
         center, quat = bullet.getBasePositionAndOrientation(self._robot, **client)
         offset = np.subtract(position, self._com)
@@ -214,13 +252,20 @@ class BulletEngine:
             self._robot, -1, body, -1, bullet.JOINT_FIXED, [0, 0, 0], offset.tolist(), [0, 0, 0], **client
         )
         bullet.changeConstraint(joint, maxForce=PAYLOAD_FORCE, **client)
-        self._payload = (body, joint)
+        velocity, spin = bullet.getBaseVelocity(self._robot, **client)
+        velocity = np.asarray(velocity) + np.cross(spin, point - center)
+        bullet.resetBaseVelocity(body, velocity.tolist(), spin, **client)
+        self._payload, self._holder = body, joint
 
-    def _detach_payload(self) -> None:
+    def release_payload(self) -> None:
+        if self._holder is not None:
+            bullet.removeConstraint(self._holder, physicsClientId=self._client)
+            self._holder = None
+
+    def _remove_payload(self) -> None:
+        self.release_payload()
         if self._payload is not None:
-            body, joint = self._payload
-            bullet.removeConstraint(joint, physicsClientId=self._client)
-            bullet.removeBody(body, physicsClientId=self._client)
+            bullet.removeBody(self._payload, physicsClientId=self._client)
             self._payload = None
 
     def render(self, camera: Camera) -> NDArray[np.uint8]:

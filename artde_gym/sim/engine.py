@@ -73,12 +73,31 @@ class Engine(Protocol):
         """Normal force of the ground on each foot during the last step (N)."""
         ...
 
+    def ground_forces(self) -> Array:
+        """Whole force of the ground on each foot during the last step, (feet, 3) (N, world axes)."""
+        ...
+
     def set_friction(self, coefficient: float) -> None:
         """Set the friction coefficient of feet and ground."""
         ...
 
+    def set_gravity(self, gravity: Vector) -> None:
+        """Set the acceleration of free fall (m/s^2, world axes)."""
+        ...
+
+    def scale_masses(self, factor: float) -> None:
+        """Set mass and inertia of every link to so many times the spec's."""
+        ...
+
     def attach_payload(self, mass: float, position: Vector) -> None:
-        """Fix a ball of `mass` (kg) to the base link, its centre at `position` in the base frame (m)."""
+        """Fix a ball of `mass` (kg) to the base link, its centre at `position` in the base frame (m).
+
+        It takes over the base's motion, and falls freely once released.
+        """
+        ...
+
+    def release_payload(self) -> None:
+        """Let go of the payload, if there is one."""
         ...
 
     def render(self, camera: Camera) -> NDArray[np.uint8]:

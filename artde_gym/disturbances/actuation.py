@@ -1,0 +1,61 @@
+"""What lies between a commanded torque and the torque that acts: delay, lost actuators, motor lag."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from artde_gym.arrays import Array
+
+
+class Actuation:
+    """Turns commands into acting torques; `start` begins an episode.
+
+    Args:
+        realised: drawn disturbances, of which "torque_delay", "actuator_loss" and "motor_lag" matter here.
+        joints: names of the actuated joints, in the order of commands.
+        time_step: of the physics (s).
+    """
+
+    KINDS = ("torque_delay", "actuator_loss", "motor_lag")
+
+    def __init__(self, realised: Mapping[str, Any], joints: Sequence[str], time_step: float) -> None:
+        self._delay: int = realised.get("torque_delay", {}).get("samples", 0)
+        constant: float = realised.get("motor_lag", {}).get("time_constant", 0.0)
+        # the share of the gap that is closed at the end of a physics step, and on average over it
+        self._closed = -math.expm1(-time_step / constant) if constant > 0 else 1.0
+        self._closed_mean = 1.0 - self._closed * constant / time_step if constant > 0 else 1.0
+        self._losses = [
+            (joints.index(loss["joint"]), loss["factor"], round(loss["start"] / time_step))
+            for loss in realised.get("actuator_loss", ())
+        ]
+        self._late: deque[Array] = deque()
+        self._acting = np.zeros(len(joints))
+
+    def start(self, tau: Array) -> None:
+        """Begin with `tau` (n,) (Nm) acting, as it did for ever before."""
+        self._late = deque([tau] * self._delay)
+        self._acting = tau
+
+    def target(self, command: Array) -> Array:
+        """What the motors aim at during a control period that begins with `command` (n,) (Nm)."""
+        self._late.append(command)
+        return self._late.popleft()
+
+    def advance(self, target: Array, step: int) -> Array:
+        """Mean torques (n,) (Nm) over physics step `step`, counted from the start of the episode."""
+        if self._losses:
+            target = target.copy()
+            for joint, factor, first in self._losses:
+                if step >= first:
+                    target[joint] *= factor
+        if self._closed == 1.0:
+            return target
+        gap = target - self._acting
+        mean = self._acting + self._closed_mean * gap
+        self._acting = self._acting + self._closed * gap
+        return mean

@@ -1,0 +1,66 @@
+"""What happens at given times: pushes, and payloads that come and go."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from artde_gym.robots.spec import Vector
+from artde_gym.sim.engine import Engine
+
+
+class _Push(NamedTuple):
+    site: str
+    force: Vector
+    first: int  # physics steps: acts from `first` up to, not including, `end`
+    end: int
+
+
+class Schedule:
+    """The timed disturbances of one episode, in physics steps of `time_step` (s)."""
+
+    def __init__(self, realised: Mapping[str, Any], time_step: float) -> None:
+        self._pushes = [_push(entry, time_step) for entry in realised.get("push", ())]
+        self._payload: Mapping[str, Any] = realised.get("payload", {})
+        self._changes: dict[int, list[str]] = {}
+        for number, push in enumerate(self._pushes):
+            self._add(push.first, f"push {number} begins")
+            self._add(push.end, f"push {number} ends")
+        if self._payload:
+            if self._payload["attach"] > 0:
+                self._add(round(self._payload["attach"] / time_step), "payload attached")
+            self._add(round(self._payload["drop"] / time_step), "payload dropped")
+
+    def start(self, engine: Engine) -> None:
+        """Bring about what is there before the first step."""
+        if self._payload.get("attach") == 0:
+            self._attach(engine)
+
+    def apply(self, step: int, engine: Engine) -> list[str]:
+        """Bring about what belongs to a step; returns what begins or ends with it, in words."""
+        events = self._changes.get(step, [])
+        for event in events:
+            if event == "payload attached":
+                self._attach(engine)
+            elif event == "payload dropped":
+                engine.release_payload()
+        for push in self._pushes:
+            if push.first <= step < push.end:
+                engine.push(push.site, push.force)
+        return events
+
+    def _attach(self, engine: Engine) -> None:
+        x, y, z = self._payload["position"]
+        engine.attach_payload(self._payload["mass"], (x, y, z))
+
+    def _add(self, step: int, event: str) -> None:
+        self._changes.setdefault(step, []).append(event)
+
+
+def _push(entry: Mapping[str, Any], time_step: float) -> _Push:
+    direction = np.asarray(entry["direction"])
+    x, y, z = (entry["magnitude"] * direction / np.linalg.norm(direction)).tolist()
+    first = round(entry["start"] / time_step)
+    return _Push(entry["body"], (x, y, z), first, first + max(1, round(entry["duration"] / time_step)))

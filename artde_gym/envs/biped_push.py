@@ -1,0 +1,26 @@
+"""`BipedPush-v0`."""
+
+from __future__ import annotations
+
+from artde_gym.disturbances.pushes import ARM_PUSH, CHEST_PUSH
+from artde_gym.envs.biped import BipedEnv, document
+
+
+@document("payload of 1.3 kg and the two pushes")
+class BipedPushEnv(BipedEnv):
+    """Ojas walks with a payload and is pushed twice: on the chest at 28 s, on the left arm at 37 s.
+
+    ## Description
+    Scenario S3 of Dantu, *Adaptive Artificial Time Delay Control for Robotic Systems* (2023): a payload of 1.3 kg, 10 N
+    on the chest, forward, and 10 N on the left upper arm at 45 degrees to the vertical, inward and down. The thesis
+    calls the pushes impulsive and gives no duration; 0.2 s here. With `arms="fixed"` the arm is one body with the
+    torso, and the push acts at the arm's own place on it; with `arms="revolute"` it acts on the arm's link.
+    `disturbances` replaces payload and pushes together.
+
+    {shared}
+
+    ## Versions
+    * v0: first version.
+    """
+
+    default_disturbances = {"payload": 1.3, "push": [CHEST_PUSH, ARM_PUSH]}

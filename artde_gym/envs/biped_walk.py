@@ -1,0 +1,23 @@
+"""`BipedWalk-Payload-v0`."""
+
+from __future__ import annotations
+
+from artde_gym.envs.biped import BipedEnv, document
+
+
+@document("payload of 1.3 kg")
+class BipedWalkPayloadEnv(BipedEnv):
+    """Ojas, a 20-joint humanoid of 8.986 kg and 0.94 m, walks with a payload on its torso.
+
+    ## Description
+    A walking pattern (stand 2 s, walk, stop) gives a reference for the twelve leg joints; the policy gives their
+    torques. What the policy does not see: payload, pushes, friction. After section 2.5 of Dantu, *Adaptive Artificial
+    Time Delay Control for Robotic Systems* (2023); the robot's mass distribution and the pattern are ours.
+
+    {shared}
+
+    ## Versions
+    * v0: first version.
+    """
+
+    default_disturbances = {"payload": 1.3}

@@ -1,0 +1,349 @@
+"""`BipedWalk-Payload-v0` from outside: Gymnasium's contract, determinism, physics and refusals."""
+
+from __future__ import annotations
+
+import multiprocessing
+import warnings
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.utils.env_checker import check_env
+
+import artde_gym
+import controllers
+from artde_gym.errors import ActionError, ArtdeGymError, DisturbanceError, OptionError, UnknownNameError
+
+ID = "BipedWalk-Payload-v0"
+
+
+def make(**kwargs: Any) -> Any:
+    kwargs.setdefault("duration", 6.0)
+    return gym.make(ID, disable_env_checker=True, **kwargs)
+
+
+def trajectory(env: Any, seed: int, steps: int, options: dict[str, Any] | None = None) -> np.ndarray:
+    """Observations under TDE from a seeded reset."""
+    policy = controllers.make("tde", env)
+    observation, _ = env.reset(seed=seed, options=options)
+    observations, state = [observation], None
+    for _ in range(steps):
+        action, state = policy.predict(observation, state)
+        observation, *_ = env.step(action)
+        observations.append(observation)
+    return np.array(observations)
+
+
+VARIED: dict[str, Any] = {
+    "payload": {"mass": {"uniform": [0.5, 1.5]}},
+    "friction": {"uniform": [0.7, 0.9]},
+    "push": [{"magnitude": {"uniform": [1, 5]}, "start": 0.05, "duration": 0.1}],
+}
+
+
+@pytest.mark.parametrize("kwargs", [{}, {"control_period": 0.004, "actuator_inertia": "lumped", "arms": "revolute"}])
+def test_gymnasium_checker_passes(kwargs: dict[str, Any]) -> None:
+    env = gym.make(ID, duration=6.0, render_mode="rgb_array", **kwargs)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # torques are in Nm by design; RescaleAction gives [-1, 1]
+        warnings.filterwarnings("ignore", message=".*recommend using a symmetric and normalized space")
+        check_env(env.unwrapped)
+    env.close()
+
+
+def test_spec_survives_json() -> None:
+    env = make(disturbances=VARIED, control_period=0.002)
+    again: Any = gym.make(EnvSpec.from_json(env.spec.to_json()))
+    assert again.unwrapped.control_period == 0.002
+    first, second = (each.reset(seed=3)[1]["disturbances"] for each in (env, again))
+    assert first == second
+
+
+def test_same_seed_same_bits_in_one_process() -> None:
+    env, other = make(disturbances=VARIED), make(disturbances=VARIED)
+    first = trajectory(env, seed=1, steps=300)
+    trajectory(env, seed=2, steps=50)
+    trajectory(env, seed=3, steps=50, options={"disturbances": {}})
+    again = trajectory(env, seed=1, steps=300, options={"disturbances": VARIED})
+    assert first.tobytes() == again.tobytes()
+    assert first.tobytes() == trajectory(other, seed=1, steps=300).tobytes()
+    assert first.tobytes() != trajectory(env, seed=2, steps=300).tobytes()
+
+
+def _trajectory_elsewhere(_: int) -> bytes:
+    return trajectory(make(disturbances=VARIED), seed=1, steps=300).tobytes()
+
+
+def test_same_seed_same_bits_in_another_process() -> None:
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        (there,) = pool.map(_trajectory_elsewhere, [0])
+    assert _trajectory_elsewhere(0) == there
+
+
+def test_two_environments_in_one_process_do_not_touch_each_other() -> None:
+    alone = trajectory(make(disturbances=VARIED), seed=5, steps=100)
+    env, disturber = make(disturbances=VARIED), make(disturbances={"payload": 3.0}, control_period=0.002)
+    policy, rng = controllers.make("tde", env), np.random.default_rng(0)
+    observation, _ = env.reset(seed=5)
+    disturber.reset(seed=6)
+    together, state = [observation], None
+    for step in range(100):
+        action, state = policy.predict(observation, state)
+        observation, *_ = env.step(action)
+        together.append(observation)
+        terminated = disturber.step(rng.uniform(-40, 40, 12))[2]
+        if terminated or step == 50:
+            disturber.reset()
+    disturber.close()
+    assert alone.tobytes() == np.array(together).tobytes()
+
+
+def test_async_vector_env_with_spawn() -> None:
+    envs: Any = gym.make_vec(
+        ID,
+        num_envs=2,
+        vectorization_mode="async",
+        vector_kwargs={"context": "spawn"},
+        duration=4.5,
+        disturbances=VARIED,
+    )
+    observations, _ = envs.reset(seed=[1, 2])
+    policy = controllers.make("artde", envs)
+    state = None
+    for _ in range(20):
+        actions, state = policy.predict(observations, state)
+        observations, *_ = envs.step(actions)
+    envs.close()
+    single = make(duration=4.5, disturbances=VARIED)
+    policy, state = controllers.make("artde", single), None
+    observation, _ = single.reset(seed=2)
+    for _ in range(20):
+        action, state = policy.predict(observation, state)
+        observation, *_ = single.step(action)
+    assert observations[1].tobytes() == observation.tobytes()
+
+
+def test_start_is_at_rest_in_balance_and_without_antagonistic_torques() -> None:
+    env = make(disturbances={})
+    observation, info = env.reset(seed=0)
+    assert info["disturbances"] == {}
+    fields = env.unwrapped.observation_layout.split(observation)
+    assert np.abs(fields["qd"]).max() < 0.02
+    assert np.degrees(np.abs(fields["q"] - fields["q_ref"])).max() < 0.05
+    left, right = fields["tau_applied"][:6], fields["tau_applied"][6:]
+    np.testing.assert_allclose(left * [1, -1, 1, 1, 1, -1], right * [1, -1, 1, 1, 1, -1], atol=0.02)
+    assert np.abs(fields["tau_applied"][[0, 1, 5]]).max() < 0.02  # nothing presses the feet apart
+    assert fields["contact"].tolist() == [1, 1]
+
+
+@pytest.mark.parametrize("mass", [0.0, 1.3, 3.0])
+def test_ground_carries_robot_and_payload(mass: float) -> None:
+    env = make(disturbances={"payload": mass} if mass else {})
+    observation, _ = env.reset(seed=0)
+    env.step(observation[env.unwrapped.observation_layout["tau_applied"]])
+    load = sum(env.unwrapped._engine.foot_loads())
+    assert load == pytest.approx((8.986 + mass) * 9.81, rel=0.01)
+
+
+def test_push_changes_momentum_by_its_impulse() -> None:
+    """In free fall, so that nothing else acts from the side: sum over all links of m v from the tree's own algebra."""
+    from artde_gym.robots.dynamics import RigidBodyTree
+    from artde_gym.robots.ojas import ojas
+    from artde_gym.sim.bullet import BulletEngine
+
+    spec = ojas("lumped")
+    engine, tree = BulletEngine(spec), RigidBodyTree(spec)
+    engine.place((0.0, 0.0, 5.0), np.zeros(12))
+
+    def momentum() -> np.ndarray:
+        state = engine.read()
+        x, y, z, w = state.quat_xyzw
+        rot = np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+        velocity = np.concatenate([state.velocity, state.angular_velocity, state.qd])
+        return (tree.mass_matrix(state.q, rot) @ velocity)[:3]
+
+    before = momentum()
+    for _ in range(100):
+        engine.push("chest", (30.0, -20.0, 10.0))
+        engine.step(np.zeros(12))
+    change = momentum() - before
+    expected = 0.1 * np.array([30.0, -20.0, 10.0 - 9.81 * 8.986])
+    np.testing.assert_allclose(change, expected, rtol=2e-3, atol=2e-3)
+    engine.close()
+
+
+def test_saturation_is_what_the_observation_reports() -> None:
+    env = make(disturbances={})
+    env.reset(seed=0)
+    action = env.unwrapped._tau.copy()
+    action[3], action[9] = -500.0, 41.0
+    observation, *_ = env.step(action)
+    applied = observation[env.unwrapped.observation_layout["tau_applied"]]
+    assert applied[3] == -40.0
+    assert applied[9] == 40.0
+    assert np.array_equal(np.delete(applied, [3, 9]), np.delete(action, [3, 9]))
+
+
+def test_reward_is_the_scaled_sum_of_its_terms() -> None:
+    from artde_gym.envs.biped import REWARD_SCALES
+
+    env = make(control_period=0.004)
+    env.reset(seed=0)
+    _, reward, _, _, info = env.step(env.unwrapped._tau * 1.1)
+    terms = info["reward_terms"]
+    assert set(terms) == set(REWARD_SCALES)
+    assert reward == pytest.approx(0.004 * sum(REWARD_SCALES[name] * value for name, value in terms.items()))
+    assert all(np.isfinite(value) and 0 <= value <= 1 for value in terms.values())
+
+
+def test_a_limp_robot_falls_and_says_why() -> None:
+    env = make(control_period=0.01)
+    env.reset(seed=0)
+    terminated = truncated = False
+    info: dict[str, Any] = {}
+    while not (terminated or truncated):
+        _, _, terminated, truncated, info = env.step(np.zeros(12))
+    assert terminated
+    assert info["fall_reason"] in ("tilt", "height")
+    assert info["time_s"] < 2.0
+
+
+def test_the_walk_ends_with_truncation_and_then_needs_a_reset() -> None:
+    env = make(duration=0.5, control_period=0.01)
+    with pytest.raises(gym.error.ResetNeeded):
+        env.unwrapped.step(np.zeros(12))
+    trajectory(env, seed=0, steps=49)
+    _, _, terminated, truncated, info = env.step(env.unwrapped._tau)
+    assert (terminated, truncated) == (False, True)
+    assert info["time_s"] == pytest.approx(0.5)
+    with pytest.raises(gym.error.ResetNeeded):
+        env.step(np.zeros(12))
+
+
+def test_observations_share_no_memory_and_stay_in_bounds() -> None:
+    env = make()
+    first, _ = env.reset(seed=0)
+    kept = first.copy()
+    second, *_ = env.step(env.unwrapped._tau)
+    assert not np.shares_memory(first, second)
+    assert np.array_equal(first, kept)
+    path = trajectory(env, seed=0, steps=500)
+    assert np.all((path >= env.observation_space.low) & (path <= env.observation_space.high))
+
+
+@pytest.mark.parametrize("kwargs", [{"speed": 0.2}, {"actuator_inertia": "lumped"}, {"arms": "revolute"}])
+def test_variants_walk(kwargs: dict[str, Any]) -> None:
+    env = make(**kwargs)
+    path = trajectory(env, seed=0, steps=5999)
+    fields = env.unwrapped.observation_layout.split(path)
+    assert np.degrees(np.sqrt(((fields["q"] - fields["q_ref"]) ** 2).mean())) < 1.0
+    assert np.abs(fields["tilt"]).max() < np.radians(5)
+    distance = fields["base_velocity"][:, 0].sum() * 0.001
+    assert distance == pytest.approx(kwargs.get("speed", 0.1) * 1.0, abs=0.03)  # two steps, the last one closes
+
+
+def test_without_rotor_inertia_tde_diverges() -> None:
+    env = make(actuator_inertia="none")
+    policy, state = controllers.make("tde", env), None
+    observation, _ = env.reset(seed=0)
+    terminated = truncated = False
+    info: dict[str, Any] = {}
+    while not (terminated or truncated):
+        action, state = policy.predict(observation, state)
+        observation, _, terminated, truncated, info = env.step(action)
+    assert terminated
+    assert info["time_s"] < 2.0
+
+
+def test_render_shows_the_robot() -> None:
+    env = make(duration=1.0, render_mode="rgb_array")
+    env.reset(seed=0)
+    picture = env.render()
+    assert picture.shape == (480, 640, 3)
+    assert picture.dtype == np.uint8
+    assert picture.std() > 10
+    env.close()
+    assert make(duration=1.0).unwrapped.render() is None
+
+
+def test_reset_options_replace_disturbances() -> None:
+    env = make()
+    assert env.reset(seed=0)[1]["disturbances"]["payload"]["mass"] == 1.3
+    assert env.reset(seed=0, options={"disturbances": {"friction": 0.5}})[1]["disturbances"] == {
+        "friction": {"coefficient": 0.5}
+    }
+    drawn = env.reset(seed=0, options={"scenario": "S2"})[1]["disturbances"]
+    assert drawn["payload"]["mass"] == 1.3
+    assert 0.7 <= drawn["friction"]["coefficient"] <= 0.9
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "words"),
+    [
+        ({"control_period": 0.0015}, ["control_period", "0.0015", "multiples"]),
+        ({"control_period": 0.0}, ["control_period", "0.0"]),
+        ({"control_period": float("nan")}, ["control_period", "nan"]),
+        ({"control_period": "fast"}, ["control_period", "fast"]),
+        ({"actuator_inertia": "heavy"}, ["actuator_inertia", "heavy", "rotor"]),
+        ({"arms": "none"}, ["arms", "none", "fixed"]),
+        ({"speed": 1.0}, ["speed", "1.0", "0.25"]),
+        ({"speed": float("nan")}, ["speed", "nan"]),
+        ({"step_duration": 0.1}, ["step_duration", "0.1"]),
+        ({"duration": -1.0}, ["duration", "-1.0"]),
+        ({"duration": float("inf")}, ["duration", "inf"]),
+        ({"engine": "ode"}, ["engine", "ode", "bullet"]),
+        ({"render_mode": "human"}, ["render_mode", "human", "rgb_array"]),
+        ({"disturbances": {"payload": -1}}, ["payload.mass", "-1"]),
+        ({"disturbances": {"payload": float("nan")}}, ["payload.mass", "nan"]),
+        ({"disturbances": {"playload": 1}}, ["playload", "payload"]),
+        ({"disturbances": 3}, ["disturbances", "3"]),
+    ],
+)
+def test_bad_arguments_name_field_value_and_what_is_allowed(kwargs: dict[str, Any], words: list[str]) -> None:
+    from artde_gym.envs.biped_walk import BipedWalkPayloadEnv
+
+    with pytest.raises(ArtdeGymError) as caught:
+        BipedWalkPayloadEnv(**kwargs)
+    message = str(caught.value)
+    assert "allowed" in message
+    for word in words:
+        assert word in message
+
+
+def test_bad_options_and_actions() -> None:
+    env = make(duration=1.0).unwrapped
+    with pytest.raises(OptionError, match="'speed'"):
+        env.reset(options={"speed": 0.2})
+    with pytest.raises(DisturbanceError, match="payload"):
+        env.reset(options={"disturbances": {"payload": "heavy"}})
+    with pytest.raises(UnknownNameError, match="S2"):
+        env.reset(options={"scenario": "S22"})
+    observation, _ = env.reset(seed=0)
+    for action in (np.zeros(11), np.zeros((1, 12)), 3.0):
+        with pytest.raises(ActionError, match="shape"):
+            env.step(action)
+    for value in (np.nan, np.inf):
+        with pytest.raises(ActionError, match="finite"):
+            env.step(np.full(12, value))
+    # a refused action changes nothing
+    assert np.array_equal(env._measure({}), observation)
+
+
+def test_closing_twice_is_safe() -> None:
+    env = make(duration=1.0)
+    env.reset(seed=0)
+    env.close()
+    env.close()
+
+
+def test_version() -> None:
+    assert artde_gym.__version__

@@ -1,0 +1,410 @@
+"""The harness from outside: metrics on made-up signals, intervals against known values, folders that survive."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+import artde_gym
+from artde_gym.cli import app
+from artde_gym.errors import ArtdeGymError, DisturbanceError, OptionError, StoreError, UnknownNameError
+from artde_gym.evaluation import SCENARIOS, Result, evaluate, statistics, thesis
+from artde_gym.evaluation.evaluate import Update, episode_seed
+from artde_gym.evaluation.metrics import Recording, episode_metrics, recovery_time
+from controllers import GainError
+
+SHORT: dict[str, Any] = {"duration": 0.4, "control_period": 0.004, "actuator_inertia": "lumped"}
+
+
+def short(controllers: Any = ("tde", "artde"), **kwargs: Any) -> Result:
+    kwargs.setdefault("scenario", "S2")
+    return evaluate(controllers, **{"episodes": 2, "env_kwargs": SHORT, **kwargs})
+
+
+# ---------------------------------------------------------------- metrics
+
+
+def recording(error: np.ndarray, **fields: np.ndarray) -> Recording:
+    """A recording of 12 joints whose error is given and all else is zero."""
+    samples = len(error)
+    signals = {name: np.zeros((samples, 12)) for name in ("q", "qd", "tau_applied")}
+    signals["base_velocity"] = np.zeros((samples, 3))
+    signals.update(fields)
+    signals["q_ref"] = signals["q"] + error
+    return Recording(0.001, signals, np.full(12, 40.0), {"q1": 6, "q2": 7}, mass=9.0)
+
+
+def test_tracking_metrics_of_a_sine() -> None:
+    time = 0.001 * np.arange(10_001)  # ten whole periods
+    error = np.zeros((len(time), 12))
+    error[:, 6] = np.radians(2.0) * np.sin(2 * np.pi * time)
+    metrics = episode_metrics(recording(error))
+    assert metrics["rmse_deg_q1"] == pytest.approx(2 / np.sqrt(2), rel=1e-4)
+    assert metrics["max_abs_error_deg_q1"] == pytest.approx(2.0)
+    assert metrics["rmse_deg_q2"] == 0
+    assert metrics["rmse_deg"] == pytest.approx(2 / np.sqrt(2 * 12), rel=1e-4)
+    mean_error = 2 * (2 / np.pi) / 12
+    assert metrics["iae_deg_s"] == pytest.approx(10 * mean_error, rel=1e-3)
+    assert metrics["itae_deg_s2"] == pytest.approx(10 * 5 * mean_error, rel=1e-2)
+
+
+def test_effort_metrics_by_hand() -> None:
+    samples = 1001  # one second
+    torque = np.zeros((samples, 12))
+    torque[1:, 6] = 3.0
+    torque[1::2, 7] = 40.0  # saturated in every other sample, switching 40 Nm each time
+    qd = np.zeros((samples, 12))
+    qd[:, 6] = 0.5
+    forward = np.zeros((samples, 3))
+    forward[:, 0] = 0.2
+    metrics = episode_metrics(recording(np.zeros((samples, 12)), tau_applied=torque, qd=qd, base_velocity=forward))
+    assert metrics["rms_torque_nm_q1"] == pytest.approx(3.0)
+    assert metrics["rms_torque_nm_q2"] == pytest.approx(40 / np.sqrt(2))
+    assert metrics["saturation"] == pytest.approx(0.5)
+    assert metrics["energy_j"] == pytest.approx(3.0 * 0.5 * 1.0)
+    assert metrics["cost_of_transport"] == pytest.approx(1.5 / (9.0 * 9.81 * 0.2), rel=2e-3)
+    assert metrics["torque_variation_nm_s"] == pytest.approx(999 * 40 / 12)
+
+
+def test_recovery_time() -> None:
+    period = 0.01
+    error = np.zeros((1000, 12))
+    error[201:350] = np.radians(2.0)  # pushed from 2.0 to 2.2 s, back in the band at 3.5 s
+    assert recovery_time(error, period, 2.0, 2.2) == pytest.approx(1.3)
+    error[400] = np.radians(2.0)  # a relapse within the second that it has to hold
+    assert recovery_time(error, period, 2.0, 2.2) == pytest.approx(1.81)
+    error[201:] = np.radians(2.0)
+    assert recovery_time(error, period, 2.0, 2.2) == np.inf
+    assert np.isnan(recovery_time(error[:150], period, 2.0, 2.2))
+
+
+# ---------------------------------------------------------------- statistics
+
+
+def test_wilson_interval_known_value() -> None:
+    """8 of 10: 0.490 to 0.943 (Newcombe 1998's formula by hand with z = 1.959964)."""
+    z, n, p = 1.959964, 10, 0.8
+    centre = (p + z**2 / (2 * n)) / (1 + z**2 / n)
+    half = z / (1 + z**2 / n) * np.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
+    estimate = statistics.rate(8, 10)
+    assert (estimate.low, estimate.high) == pytest.approx((centre - half, centre + half), abs=1e-5)
+    assert statistics.rate(0, 5).low == 0
+    assert statistics.rate(5, 5).high == pytest.approx(1)
+
+
+def test_bootstrap_interval_covers_the_mean_as_often_as_it_says() -> None:
+    rng = np.random.default_rng(0)
+    inside = 0
+    for _ in range(200):
+        estimate = statistics.mean(rng.normal(3.0, 1.0, size=40))
+        inside += estimate.low <= 3.0 <= estimate.high
+    assert 0.88 <= inside / 200 <= 0.99
+
+
+def test_mean_of_few_and_of_broken_values() -> None:
+    assert statistics.mean([2.0])[0] == 2.0
+    assert np.isnan(statistics.mean([2.0]).low)
+    assert statistics.mean([2.0, 2.0])[:3] == (2.0, 2.0, 2.0)
+    assert statistics.mean([1.0, np.nan, 3.0, np.inf]).n == 2
+    assert statistics.mean([]).n == 0
+    assert statistics.win_probability([1, 2, 3], [2, 2, 2]) == 0.5
+
+
+def test_comparison_pairs_by_episode_and_leaves_fallen_pairs_out() -> None:
+    rows = [
+        {"scenario": "S", "controller": name, "episode": i, "seed": i, "fell": fell, "duration_s": 1.0}
+        | {"time_to_fall_s": 0.5 if fell else np.nan, "rmse_deg": error}
+        for name, values in {"a": [(1.0, 0), (2.0, 0), (9.0, 1)], "b": [(2.0, 0), (4.0, 0), (1.0, 0)]}.items()
+        for i, (error, fell) in enumerate(values)
+    ]
+    table = Result(pd.DataFrame(rows)).compare("a", "b")
+    row = table.loc[("S", "rmse_deg")]
+    assert row["pairs"] == 2
+    assert row["difference"] == -1.5
+    assert row["percent"] == pytest.approx(-50.0)
+    assert row["win_probability"] == 1.0
+    assert table.loc[("S", "fell")]["difference"] == pytest.approx(1 / 3)
+    with pytest.raises(UnknownNameError, match="'c'"):
+        Result(pd.DataFrame(rows)).compare("a", "c")
+
+
+# ---------------------------------------------------------------- thesis
+
+
+def test_thesis_values_and_the_improvements_it_claims() -> None:
+    """Design: over all joints the least improvement of ARTDE's RMSE in Table 2.1 is 32.7 % and 20.1 %."""
+    assert thesis.value("S1", "tde", "rmse_deg", "q4") == 3.264
+    assert thesis.value("S2", "tde", "rmse_deg", "q4") is None
+    for rival, least in (("tde", 0.327), ("atde", 0.201)):
+        gains = [
+            1 - thesis.VALUES["S1"]["artde"]["rmse_deg"][i] / thesis.VALUES["S1"][rival]["rmse_deg"][i]
+            for i in range(6)
+        ]
+        assert min(gains) == pytest.approx(least, abs=5e-4)
+
+
+# ---------------------------------------------------------------- evaluate
+
+
+def test_same_seed_same_disturbances_whatever_the_controller() -> None:
+    episodes: Any = short(episodes=3).episodes
+    drawn = [name for name in episodes if name.startswith("disturbance.")]
+    assert len(drawn) > 5
+    tde, artde = (episodes[episodes["controller"] == name].set_index("episode")[drawn] for name in ("tde", "artde"))
+    pd.testing.assert_frame_equal(tde, artde)
+    assert tde["disturbance.push.0.magnitude"].nunique() == 3
+    assert tde["disturbance.push.0.magnitude"].between(0.5, 5.0).all()
+
+
+def test_workers_do_not_change_results() -> None:
+    alone, together = short(workers=1).episodes, short(workers=2).episodes
+    pd.testing.assert_frame_equal(alone, together, check_exact=True)
+
+
+def test_environment_as_it_is_and_episode_seeds() -> None:
+    result = short(scenario=None, disturbances={"payload": 0.5})
+    assert result.scenarios == ["custom"]
+    assert set(result.episodes["disturbance.payload.mass"]) == {0.5}
+    assert result.episodes["seed"].tolist()[0] == episode_seed(0, 0)
+    seeds = {episode_seed(seed, episode) for seed in range(20) for episode in range(20)}
+    assert len(seeds) == 400
+
+
+class Limp:
+    """A policy object of a user's own, without `diagnostics` and without state."""
+
+    name = "limp"
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
+    ) -> Any:
+        return np.zeros(12), None
+
+
+def make_limp(env: Any, **_: Any) -> Limp:
+    return Limp()
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_policy_objects_and_registered_controllers(workers: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    from artde_gym import registration
+
+    monkeypatch.setattr(registration, "_controllers", dict(registration._controllers))
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    artde_gym.register_controller("mine", "test_evaluation:make_limp")
+    import test_evaluation  # as a worker will import it
+
+    result = short({"mine": "mine", "object": test_evaluation.Limp()}, episodes=1, workers=workers)
+    table: Any = result.episodes
+    mine, other = (table[table["controller"] == name].iloc[0] for name in ("mine", "object"))
+    assert mine["rmse_deg"] == other["rmse_deg"] > 1.0
+    assert np.isnan(mine["tde_error_rms"])
+
+
+def test_gains_reach_the_controller() -> None:
+    soft, stiff = (short(["tde"], episodes=1, gains=gains) for gains in ({"tde": {"k_p": 1.0}}, None))
+    assert soft.episodes["rmse_deg"].tolist() != stiff.episodes["rmse_deg"].tolist()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "words"),
+    [
+        ({"controllers": ["tdee"]}, UnknownNameError, ["tdee", "did you mean 'tde'"]),
+        ({"controllers": []}, OptionError, ["controllers"]),
+        ({"controllers": ["tde", "tde"]}, OptionError, ["tde", "once"]),
+        ({"controllers": [3]}, OptionError, ["3", "predict"]),
+        ({"scenario": "S9"}, UnknownNameError, ["S9", "S1-L4"]),
+        ({"scenario": []}, OptionError, ["scenario"]),
+        ({"gains": {"artde": {"gama_0": 1}}}, GainError, ["gama_0", "gamma_0"]),
+        ({"gains": {"artde": {"gamma_0": -1}}}, GainError, ["gamma_0", "-1"]),
+        ({"gains": {"atde": {}}}, UnknownNameError, ["atde"]),
+        ({"episodes": 0}, OptionError, ["episodes", "0"]),
+        ({"workers": 0}, OptionError, ["workers", "0"]),
+        ({"seed": -1}, OptionError, ["seed", "-1"]),
+        ({"trace_hz": 0.0}, OptionError, ["trace_hz"]),
+        ({"env_kwargs": {"durration": 1}}, OptionError, ["durration", "duration"]),
+        ({"env_kwargs": {"control_period": 0.0011}}, OptionError, ["control_period", "0.0011"]),
+        ({"env_kwargs": {"speed": {1}}}, OptionError, ["env_kwargs", "JSON"]),
+        ({"disturbances": {"payload": float("inf")}}, DisturbanceError, ["payload.mass", "inf"]),
+    ],
+)
+def test_bad_arguments_are_refused_before_the_first_episode(
+    arguments: dict[str, Any], error: type[Exception], words: list[str], tmp_path: Path
+) -> None:
+    with pytest.raises(error) as caught:
+        short(arguments.pop("controllers", ("tde", "artde")), out=tmp_path / "run", **arguments)
+    assert isinstance(caught.value, (ArtdeGymError, GainError))
+    for word in words:
+        assert word in str(caught.value)
+    assert not (tmp_path / "run").exists()
+
+
+def test_scenarios_are_what_the_design_fixes() -> None:
+    assert set(SCENARIOS) >= {"S1", "S2", "S1-L4", "S2-L4"}
+    assert SCENARIOS["S2-L4"].kwargs == {"control_period": 0.004}
+    assert "payload" not in SCENARIOS["S1"].disturbances
+    assert SCENARIOS["S2"].disturbances["payload"]["mass"] == 1.3
+
+
+# ---------------------------------------------------------------- store
+
+
+def test_folder_holds_what_the_documentation_says(tmp_path: Path) -> None:
+    result = short(out=tmp_path / "run")
+    folder = tmp_path / "run"
+    table = pd.read_csv(folder / "episodes.csv")
+    assert list(table["controller"]) == list(result.episodes["controller"])
+    np.testing.assert_array_equal(table["rmse_deg_q3"], result.episodes["rmse_deg_q3"])  # to the last bit
+    assert {"env", "scenario", "seed", "episode", "fell", "time_to_fall_s", "max_abs_error_deg_q6"} <= set(table)
+    summary = pd.read_csv(folder / "summary.csv")
+    assert {"scenario", "controller", "metric", "mean", "low", "high", "n"} == set(summary)
+    record = json.loads((folder / "summary.json").read_text())
+    assert record["episodes"] == 4
+    assert record["configuration"]["seed"] == 0
+    assert record["provenance"]["packages"]["pybullet"] == "3.2.7"
+    traces = np.load(folder / "traces" / "S2" / "artde-1.npz")
+    assert traces["time"] == pytest.approx(0.008 * np.arange(51))  # 125 Hz is the nearest whole stride of 4 ms
+    assert traces["q"].shape == (51, 12)
+    assert {"policy.sigma", "policy.s", "policy.beta_0", "policy.beta_1"} <= set(traces)
+
+
+def test_traces_at_full_rate_on_request(tmp_path: Path) -> None:
+    short(["tde"], episodes=1, out=tmp_path, trace_hz=float("inf"))
+    assert np.load(tmp_path / "traces" / "S2" / "tde-0.npz")["q"].shape == (101, 12)
+
+
+def test_interruption_keeps_episodes_and_the_same_call_continues(tmp_path: Path) -> None:
+    whole = short(episodes=3, out=tmp_path / "whole")
+
+    def interrupt(update: Update) -> None:
+        if update.finished == 4:
+            raise KeyboardInterrupt
+
+    part = short(episodes=3, out=tmp_path / "part", on_progress=interrupt)
+    assert not part.complete
+    assert len(part.episodes) == 3
+    assert len(pd.read_csv(tmp_path / "part" / "episodes.csv")) == 3
+    assert (tmp_path / "part" / "summary.csv").exists()
+
+    seen: list[Update] = []
+    resumed = short(episodes=3, out=tmp_path / "part", on_progress=seen.append)
+    assert sum(update.ended for update in seen) == 3
+    assert resumed.complete
+    pd.testing.assert_frame_equal(resumed.episodes, whole.episodes, check_exact=True, check_dtype=False)
+    assert (tmp_path / "part" / "episodes.csv").read_bytes() == (tmp_path / "whole" / "episodes.csv").read_bytes()
+
+
+def test_a_row_cut_off_by_a_crash_is_run_again(tmp_path: Path) -> None:
+    whole = short(out=tmp_path)
+    path = tmp_path / "episodes.csv"
+    good = path.read_bytes()
+    path.write_bytes(good[:-40])
+    resumed = short(out=tmp_path)
+    assert path.read_bytes() == good
+    pd.testing.assert_frame_equal(resumed.episodes, whole.episodes, check_exact=True, check_dtype=False)
+
+
+def test_a_folder_with_other_results_is_refused(tmp_path: Path) -> None:
+    short(["tde"], episodes=1, out=tmp_path / "run")
+    before = (tmp_path / "run" / "episodes.csv").read_bytes()
+    with pytest.raises(StoreError, match=r"other results.*seed"):
+        short(["tde"], episodes=1, seed=1, out=tmp_path / "run")
+    assert (tmp_path / "run" / "episodes.csv").read_bytes() == before
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "letter.txt").write_text("dear")
+    with pytest.raises(StoreError, match="something else"):
+        short(["tde"], episodes=1, out=tmp_path / "mine")
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "summary.json").write_text("{")
+    with pytest.raises(StoreError, match="can be read"):
+        short(["tde"], episodes=1, out=tmp_path / "broken")
+
+
+# ---------------------------------------------------------------- command line
+
+
+def test_command_prints_ours_beside_the_thesis(tmp_path: Path) -> None:
+    arguments = ["evaluate", "--scenario", "S1", "--episodes", "1", "--env-kwargs", json.dumps(SHORT)]
+    outcome = CliRunner().invoke(app, [*arguments, "--out", str(tmp_path / "run"), "--workers", "1"])
+    assert outcome.exit_code == 0, outcome.output
+    for word in (
+        "S1: walk without payload",
+        "Table 2.1",
+        "RMS error (deg)",
+        "RMS torque (Nm)",
+        "3.264",
+        "-36.5",
+        "walks",
+    ):
+        assert word in outcome.output
+    listing = CliRunner().invoke(app, ["list"]).output
+    for word in ("BipedWalk-Payload-v0", "S2-L4", "artde-robust", "computed-torque"):
+        assert word in listing
+
+
+def run_command(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "artde_gym.cli", *arguments], capture_output=True, text=True, timeout=60, check=False
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["evaluate", "--controllers", "tdee"], ["tdee", "did you mean 'tde'"]),
+        (["evaluate", "--gains", "{"], ["--gains", "JSON"]),
+        (["evaluate", "--env", "BipedRun-v0"], ["BipedRun"]),
+    ],
+)
+def test_a_mistake_is_one_line_and_exit_code_2(arguments: list[str], words: list[str], tmp_path: Path) -> None:
+    outcome = run_command(*arguments, "--out", str(tmp_path / "run"))
+    assert outcome.returncode == 2
+    assert "Traceback" not in outcome.stderr
+    assert len(outcome.stderr.strip().splitlines()) == 1
+    for word in words:
+        assert word in outcome.stderr
+
+
+def test_ctrl_c_keeps_every_finished_episode(tmp_path: Path) -> None:
+    """A real interrupt to a real process group, workers included."""
+    arguments = ["evaluate", "--scenario", "S2", "--controllers", "tde", "--episodes", "500", "--workers", "2"]
+    process = subprocess.Popen(
+        [
+            sys.executable,
+            "-m",
+            "artde_gym.cli",
+            *arguments,
+            "--env-kwargs",
+            json.dumps(SHORT),
+            "--out",
+            str(tmp_path / "run"),
+        ],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    table = tmp_path / "run" / "episodes.csv"
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline and (not table.exists() or table.read_text().count("\n") < 4):
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGINT)
+    output, errors = process.communicate(timeout=60)
+    assert process.returncode == 130, errors
+    assert "Traceback" not in errors
+    assert "Interrupted" in output
+    rows = pd.read_csv(table)
+    assert 3 <= len(rows) < 500
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["episodes"] == len(rows)
