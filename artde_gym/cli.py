@@ -19,12 +19,17 @@ from artde_gym import __version__
 from artde_gym.errors import ArtdeGymError, OptionError
 from artde_gym.evaluation import SCENARIOS
 from artde_gym.evaluation import evaluate as run_evaluation
-from artde_gym.evaluation.console import print_result
+from artde_gym.evaluation import frontier as run_frontier
+from artde_gym.evaluation.claims import CLAIMS, judge
+from artde_gym.evaluation.console import print_claims, print_result
 from artde_gym.evaluation.evaluate import Update
+from artde_gym.evaluation.frontier_axis import DEFAULTS
+from artde_gym.evaluation.frontier_console import print_frontier
 from artde_gym.registration import registered_controllers
 from controllers import GainError
 
 MAIN_SCENARIOS = "S1,S2,S1-L4,S2-L4"
+REPRODUCED = "S1,S2,S3,S1-L4,S2-L4,S3-L4,S1-GRF"
 WALK = "BipedWalk-Payload-v0"
 
 app = typer.Typer(
@@ -89,6 +94,85 @@ def evaluate(
         raise typer.Exit(130)
 
 
+@app.command()
+def frontier(
+    vary: Annotated[str, typer.Option(help=f"What to vary; with a range of its own: {', '.join(DEFAULTS)}.")],
+    controllers: Annotated[str, typer.Option(help="Names, comma-separated; see `list`.")] = "tde,atde,artde",
+    env: Annotated[str, typer.Option(help="Environment id.")] = "BipedPush-v0",
+    low: Annotated[float | None, typer.Option(help="Smallest value, in the parameter's unit.")] = None,
+    high: Annotated[float | None, typer.Option(help="Largest value.")] = None,
+    tolerance: Annotated[float | None, typer.Option(help="Width of the bracket to be found.")] = None,
+    harder: Annotated[str | None, typer.Option(help="larger or smaller: which values are harder.")] = None,
+    episodes: Annotated[int, typer.Option(help="Seeded episodes of each controller at each level.")] = 20,
+    seed: Annotated[int, typer.Option(help="Seed of everything.")] = 0,
+    workers: Annotated[int | None, typer.Option(help="Processes. Default: all cores.")] = None,
+    survival: Annotated[float, typer.Option(help="Share of episodes without a fall that counts as survived.")] = 0.9,
+    out: Annotated[Path | None, typer.Option(help="Results folder. Default: runs/<date and time>.")] = None,
+    engine: Annotated[str | None, typer.Option(help="Physics engine.")] = None,
+    disturbances: Annotated[str | None, typer.Option(help="JSON, in place of the standard test's.")] = None,
+    env_kwargs: Annotated[str | None, typer.Option(help="JSON, arguments of the environment.")] = None,
+    gains: Annotated[str | None, typer.Option(help='JSON, e.g. {"artde": {"gamma_0": 200}}.')] = None,
+) -> None:
+    """Find how much of one disturbance each controller survives; the same command continues an interrupted run."""
+    kwargs = _json("--env-kwargs", env_kwargs)
+    if engine is not None:
+        kwargs["engine"] = engine
+    console = Console()
+    with Display(console) as display:
+        found = run_frontier(
+            [name.strip() for name in controllers.split(",")],
+            env,
+            vary,
+            low=low,
+            high=high,
+            tolerance=tolerance,
+            harder=harder,  # pyright: ignore[reportArgumentType]  # checked there
+            survival=survival,
+            episodes=episodes,
+            seed=seed,
+            workers=workers or os.cpu_count() or 1,
+            out=out or Path("runs") / datetime.datetime.now().strftime("%Y-%m-%d-%H%M%S"),
+            disturbances=_json("--disturbances", disturbances) if disturbances is not None else None,
+            env_kwargs=kwargs,
+            gains=_json("--gains", gains),
+            on_progress=lambda value, update: display(update, f"{vary} {value:g}"),
+        )
+    print_frontier(found, console)
+    if not found.complete:
+        raise typer.Exit(130)
+
+
+@app.command()
+def reproduce(
+    episodes: Annotated[int, typer.Option(help="Seeded episodes of each controller in each scenario.")] = 10,
+    scenario: Annotated[str, typer.Option(help="Names, comma-separated.")] = REPRODUCED,
+    controllers: Annotated[str, typer.Option(help="Names, comma-separated.")] = "tde,atde,artde,tde+kd",
+    seed: Annotated[int, typer.Option(help="Seed of the whole run.")] = 0,
+    workers: Annotated[int | None, typer.Option(help="Processes. Default: all cores.")] = None,
+    out: Annotated[Path, typer.Option(help="Results folder; the same call continues an interrupted one.")] = Path(
+        "runs/reproduce"
+    ),
+) -> None:
+    """Run the thesis' scenarios and print each of its claims with a verdict, then its tables beside ours."""
+    console = Console()
+    with Display(console) as display:
+        result = run_evaluation(
+            [name.strip() for name in controllers.split(",")],
+            scenario=[name.strip() for name in scenario.split(",")],
+            episodes=episodes,
+            seed=seed,
+            workers=workers or os.cpu_count() or 1,
+            out=out,
+            on_progress=display,
+        )
+    print_result(result, console)
+    verdicts = judge(result, [claim for claim in CLAIMS if claim.scenario in result.scenarios])
+    verdicts.to_csv(out / "claims.csv", index=False)
+    print_claims(verdicts, console)
+    if not result.complete:
+        raise typer.Exit(130)
+
+
 @app.command("list")
 def list_() -> None:
     """Show environments, scenarios and controllers."""
@@ -123,14 +207,14 @@ class Display:
     def __init__(self, console: Console) -> None:
         self._running: dict[tuple[str, str, int], float] = {}
         self._progress = Progress(
-            TextColumn("episodes"),
+            TextColumn("{task.fields[what]}"),
             BarColumn(),
             MofNCompleteColumn(),
             TimeElapsedColumn(),
             TextColumn("{task.description}"),
             console=console,
         )
-        self._bar = self._progress.add_task("", total=None)
+        self._bar = self._progress.add_task("", total=None, what="episodes")
 
     def __enter__(self) -> Display:
         return self
@@ -139,7 +223,7 @@ class Display:
         self._progress.update(self._bar, description="")
         self._progress.stop()
 
-    def __call__(self, update: Update) -> None:
+    def __call__(self, update: Update, what: str = "episodes") -> None:
         self._progress.start()  # with the first news; an error before it leaves no empty bar
         key = (update.task.cell.name, update.task.controller, update.task.episode)
         self._running[key] = update.time_s
@@ -148,7 +232,7 @@ class Display:
         text = ", ".join(
             f"{name} {controller} #{n}: {time:.0f} s" for (name, controller, n), time in self._running.items()
         )
-        self._progress.update(self._bar, completed=update.finished, total=update.total, description=text)
+        self._progress.update(self._bar, completed=update.finished, total=update.total, description=text, what=what)
 
 
 def _json(option: str, text: str | None) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -41,6 +42,17 @@ def print_result(result: Result, console: Console) -> None:
         console.print(f"\nWritten to {result.folder}")
 
 
+def print_claims(verdicts: pd.DataFrame, console: Console) -> None:
+    """Print the table of `artde_gym.evaluation.claims.judge`."""
+    styles = {"holds": "green", "does not hold": "red", "undecided": "yellow", "not measured": "dim"}
+    table = _table("scenario", "claim", "verdict", "measured", "thesis", title="Claims")
+    for scenario, claim, verdict, measured, printed in verdicts.itertuples(index=False, name=None):
+        table.add_row(scenario, claim, Text(verdict, style=styles[verdict]), measured, printed)
+        table.add_section()
+    console.print()
+    console.print(table)
+
+
 def _scenario(result: Result, summary: pd.DataFrame, scenario: str) -> Group:
     entry = SCENARIOS.get(scenario)
     reference = entry.thesis if entry else None
@@ -50,10 +62,23 @@ def _scenario(result: Result, summary: pd.DataFrame, scenario: str) -> Group:
     if reference in thesis.TABLES:
         note += f"; thesis: {thesis.TABLES[reference]}"
     parts: list[RenderableType] = [title, Text(note, style="dim"), _falls(result, scenario, reference)]
-    axes = [name.removeprefix("rmse_deg_") for name in result.metrics if name.startswith("rmse_deg_")]
-    for metric in METRICS:
-        parts += _metric(result, summary, scenario, reference, metric, axes)
+    axes = [name.removeprefix("rmse_deg_") for name in result.metrics if re.fullmatch(r"rmse_deg_(?!phase)\w+", name)]
+    for metric, title in _measured(scenario).items():
+        parts += _metric(result, summary, scenario, reference, metric, title, axes)
     return Group(*parts)
+
+
+def _measured(scenario: str) -> dict[str, str]:
+    """Metrics to show and their titles: each phase by itself where the scenario has phases."""
+    entry = SCENARIOS.get(scenario)
+    if entry is None or not entry.phases:
+        return METRICS
+    shown = {}
+    for metric, title in METRICS.items():
+        for number, (start, end) in enumerate(entry.phases, start=1):
+            part = f"{start:g} to {end:g} s" if math.isfinite(end) else f"from {start:g} s"
+            shown[f"{metric}_phase{number}"] = f"{title}, {part}"
+    return shown
 
 
 def _falls(result: Result, scenario: str, reference: str | None) -> Table:
@@ -81,7 +106,13 @@ def _thesis_fall(reference: str | None, controller: str) -> str:
 
 
 def _metric(
-    result: Result, summary: pd.DataFrame, scenario: str, reference: str | None, metric: str, axes: list[str]
+    result: Result,
+    summary: pd.DataFrame,
+    scenario: str,
+    reference: str | None,
+    metric: str,
+    title: str,
+    axes: list[str],
 ) -> list[Table]:
     """Two rows an axis, ours and the thesis'. Few controllers and their comparisons share one table."""
     controllers = result.controllers
@@ -90,7 +121,7 @@ def _metric(
     means: dict[Any, float] = summary["mean"].to_dict()
 
     def table(shown: list[str], compared: list[str]) -> Table:
-        part = _table("axis", "", title=METRICS[metric])
+        part = _table("axis", "", title=title)
         for name in (*shown, *(f"{REFERENCE} vs {rival} (%)" for rival in compared)):
             part.add_column(name, justify="right")
         for axis in axes:

@@ -48,6 +48,27 @@ def mean(values: ArrayLike) -> Estimate:
     return Estimate(center, float(interval.low), float(interval.high), len(finite))
 
 
+def improvement(ours: ArrayLike, theirs: ArrayLike) -> Estimate:
+    """By how many percent the mean of ours is below that of theirs, for paired values, with a bootstrap interval."""
+    pairs = np.array([ours, theirs], dtype=np.float64).reshape(2, -1)
+    a, b = pairs[:, np.isfinite(pairs).all(axis=0)]
+    if len(a) == 0:
+        return Estimate(np.nan, np.nan, np.nan, 0)
+    value = 100.0 * (1.0 - float(a.mean() / b.mean()))
+    if len(a) == 1:
+        return Estimate(value, np.nan, np.nan, 1)
+    interval = stats.bootstrap(
+        (a, b),
+        lambda x, y, axis: 100.0 * (1.0 - x.mean(axis=axis) / y.mean(axis=axis)),
+        n_resamples=RESAMPLES,
+        confidence_level=CONFIDENCE,
+        method="percentile",
+        paired=True,
+        rng=np.random.default_rng(0),
+    ).confidence_interval
+    return Estimate(value, float(interval.low), float(interval.high), len(a))
+
+
 def rate(successes: int, trials: int) -> Estimate:
     """A rate with Wilson's score interval."""
     if trials == 0:

@@ -1,0 +1,113 @@
+"""Verdicts on made-up episodes whose answer is known."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from rich.console import Console
+
+from artde_gym.evaluation import SCENARIOS, Result, statistics, thesis
+from artde_gym.evaluation.claims import CLAIMS, adapts, falls, improves, judge, repeats
+from artde_gym.evaluation.console import print_claims
+
+
+def episodes(errors: dict[str, float], fell: dict[str, int] | None = None, n: int = 20, scenario: str = "S") -> Result:
+    """`n` paired episodes whose RMSE scatters by 5 % about `errors`; the first `fell[name]` of them end in a fall."""
+    rng = np.random.default_rng(0)
+    rows: list[dict[str, Any]] = []
+    for episode in range(n):
+        seed = rng.normal(1.0, 0.05)
+        for name, error in errors.items():
+            down = episode < (fell or {}).get(name, 0)
+            row: dict[str, Any] = {"scenario": scenario, "controller": name, "episode": episode, "seed": episode}
+            row |= {"fell": down, "time_to_fall_s": 5.0 if down else np.nan, "duration_s": 58.0}
+            for metric in ("rmse_deg", "max_abs_error_deg"):
+                row |= {f"{metric}_{joint}": error * seed * rng.normal(1.0, 0.01) for joint in thesis.JOINTS}
+            rows.append(row | {"rmse_deg": error * seed * rng.normal(1.0, 0.01)})
+    return Result(pd.DataFrame(rows))
+
+
+@pytest.mark.parametrize(
+    ("artde", "outcome"), [(0.60, "holds"), (0.85, "does not hold"), (1.3, "does not hold"), (0.709, "undecided")]
+)
+def test_improvement_by_at_least_29_percent(artde: float, outcome: str) -> None:
+    verdict = improves("S", "tde", "rmse_deg", 29.1)(episodes({"tde": 1.0, "artde": artde}))
+    assert verdict.outcome == outcome
+    assert "20 pairs" in verdict.measured
+
+
+def test_one_joint_that_fails_breaks_the_claim() -> None:
+    result = episodes({"tde": 1.0, "artde": 0.5})
+    table = result.episodes.copy()
+    table.loc[table["controller"] == "artde", "rmse_deg_q3"] *= 1.8
+    verdict = improves("S", "tde", "rmse_deg", 29.1)(Result(table))
+    assert verdict.outcome == "does not hold"
+    assert "q3" in verdict.measured
+
+
+def test_improvement_counts_only_pairs_that_walked() -> None:
+    fallen = episodes({"tde": 1.0, "artde": 0.5}, fell={"tde": 20})
+    verdict = improves("S", "tde", "rmse_deg", 29.1)(fallen)
+    assert verdict.outcome == "not measured"
+    assert "tde" in verdict.measured
+    assert improves("S", "tde", "rmse_deg", 0.0)(episodes({"artde": 1.0})).outcome == "not measured"
+
+
+@pytest.mark.parametrize(
+    ("fell", "outcome"),
+    [
+        ({"tde": 20, "atde": 19, "artde": 1}, "holds"),
+        ({"tde": 20, "atde": 20, "artde": 18}, "does not hold"),
+        ({"tde": 0, "atde": 0, "artde": 0}, "does not hold"),
+        ({"tde": 20, "atde": 20, "artde": 13}, "undecided"),  # 13 of 20: 43 to 82 %
+    ],
+)
+def test_who_falls(fell: dict[str, int], outcome: str) -> None:
+    result = episodes({"tde": 1.0, "atde": 1.0, "artde": 1.0}, fell)
+    verdict = falls("S", {"tde": True, "atde": True, "artde": False})(result)
+    assert verdict.outcome == outcome
+    assert f"tde {fell['tde']}/20" in verdict.measured
+
+
+def test_repeats() -> None:
+    def both(ratio: float) -> Result:
+        parts = [episodes({"artde": error}, scenario=name).episodes for name, error in (("A", ratio), ("B", 1.0))]
+        return Result(pd.concat(parts, ignore_index=True))
+
+    assert repeats("A", "B", "rmse_deg", 15.0)(both(1.05)).outcome == "holds"
+    assert repeats("A", "B", "rmse_deg", 15.0)(both(1.4)).outcome == "does not hold"
+    assert repeats("A", "B", "rmse_deg", 15.0)(both(0.6)).outcome == "does not hold"
+
+
+def test_adaptation_against_the_equivalent_gain() -> None:
+    assert adapts("S")(episodes({"artde": 0.8, "tde+kd": 1.0})).outcome == "holds"
+    assert adapts("S")(episodes({"artde": 1.1, "tde+kd": 1.0})).outcome == "does not hold"
+    assert adapts("S")(episodes({"artde": 0.8, "tde+kd": 1.0}, {"artde": 13})).outcome == "does not hold"
+    assert adapts("S")(episodes({"artde": 0.8, "tde+kd": 1.0}, {"tde+kd": 13})).outcome == "holds"
+    assert adapts("S")(episodes({"artde": 1.0})).outcome == "not measured"
+
+
+def test_improvement_interval_covers_the_truth() -> None:
+    """Paired values with a true improvement of 30 %: about 95 % of the intervals contain it."""
+    rng = np.random.default_rng(1)
+    inside = 0
+    for _ in range(100):
+        theirs = rng.normal(1.0, 0.2, size=30)
+        estimate = statistics.improvement(0.7 * theirs * rng.normal(1.0, 0.05, size=30), theirs)
+        inside += estimate.low <= 30.0 <= estimate.high
+    assert inside >= 86
+
+
+def test_every_claim_belongs_to_a_scenario_and_prints() -> None:
+    assert {claim.scenario for claim in CLAIMS} <= set(SCENARIOS)
+    verdicts = judge(episodes({"tde": 1.0, "atde": 0.9, "artde": 0.6, "tde+kd": 0.55}, scenario="S1", n=6))
+    assert len(verdicts) == len(CLAIMS)
+    assert set(verdicts["verdict"]) <= {"holds", "does not hold", "undecided", "not measured"}
+    console = Console(record=True, width=120)
+    print_claims(verdicts, console)
+    text = console.export_text()
+    assert "does not hold" in text
+    assert "not measured" in text
