@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 LOADED = 1.0  # N, from which on a foot touches the ground
-AIRBORNE = 0.05  # s without load that make a swing; shorter gaps are the flicker of a box's contacts
+AIRBORNE = 0.25  # s without load that make a swing; a foot that has just landed bounces for up to 0.2 s
 
 
 class GrfPulse:

@@ -67,7 +67,7 @@ KINDS: dict[str, Kind] = {
                 Parameter("mass", "kg", 1e-3, 5.0, None, "mass of the ball"),
                 Parameter("position", "m", -0.5, 0.5, (0.0, 0.0, 0.16), "its centre in the base frame", size=3),
                 _time("attach", 0.0, "from when; at 0 the episode starts in balance with it"),
-                _time("drop", NEVER, "until when"),
+                _time("drop", NEVER, "until when; not after `attach`, it never appears"),
             ),
             scalar="mass",
         ),
@@ -178,11 +178,32 @@ KINDS: dict[str, Kind] = {
 }
 
 
-def schema() -> str:
-    """All kinds and parameters as Markdown, from the tables that check them."""
+INTRODUCTION = """\
+# Disturbances
+
+What happens to a robot beyond its own dynamics, as data: one JSON-able grammar for all environments, accepted by
+`gymnasium.make(..., disturbances=...)`, by `env.reset(options={"disturbances": ...})` and by the command line.
+
+    {"payload": 1.3,
+     "push": [{"body": "chest", "magnitude": {"uniform": [5, 40]}, "direction": [1, 0, 0], "start": 28.0}],
+     "friction": {"coefficient": {"choice": [0.7, 0.8, 0.9]}},
+     "initial_pose": {"joint": "all", "offset": {"normal": [0, 0.001]}}}
+
+In place of any number stands a number or a distribution: `{"uniform": [low, high]}`, `{"normal": [mean, std]}` (drawn
+again until it lies in the allowed range) or `{"choice": [...]}`, whose items are vectors where the parameter is one.
+Values are drawn at each reset from the environment's own seeded generator; `info["disturbances"]` holds what was drawn,
+in the same grammar. Several kinds act together; kinds marked *list* take several entries. Anything outside the grammar
+raises `DisturbanceError` when the environment is made or reset, with the key, the value and what is allowed.
+
+"""
+
+
+def page() -> str:
+    """The grammar as a Markdown page, from the tables that check it."""
     lines = []
     for kind in KINDS.values():
-        lines += [f"### `{kind.name}`", "", kind.text, "", "| parameter | unit | allowed | default | meaning |"]
+        marks = " (list)" if kind.repeated else ""
+        lines += [f"## `{kind.name}`{marks}", "", kind.text, "", "| parameter | unit | allowed | default | meaning |"]
         lines += ["|---|---|---|---|---|"]
         for parameter in kind.parameters:
             default = "required" if parameter.default is None else f"`{parameter.default}`"
@@ -190,7 +211,7 @@ def schema() -> str:
             row = (f"`{parameter.name}`", parameter.unit, allowed(parameter), default, text)
             lines.append("| " + " | ".join(row) + " |")
         lines.append("")
-    return "\n".join(lines)
+    return INTRODUCTION + "\n".join(lines)
 
 
 def allowed(parameter: Parameter) -> str:

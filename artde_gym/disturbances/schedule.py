@@ -28,14 +28,14 @@ class Schedule:
         for number, push in enumerate(self._pushes):
             self._add(push.first, f"push {number} begins")
             self._add(push.end, f"push {number} ends")
-        if self._payload:
+        if self._payload and self._payload["drop"] > self._payload["attach"]:
             if self._payload["attach"] > 0:
                 self._add(round(self._payload["attach"] / time_step), "payload attached")
             self._add(round(self._payload["drop"] / time_step), "payload dropped")
 
     def start(self, engine: Engine) -> None:
         """Bring about what is there before the first step."""
-        if self._payload.get("attach") == 0:
+        if self._payload.get("attach") == 0 and self._payload["drop"] > 0:
             self._attach(engine)
 
     def apply(self, step: int, engine: Engine) -> list[str]:

@@ -32,6 +32,7 @@ FRICTION = 0.8  # of feet and ground
 FALL_TILT_DEG = 35.0
 FALL_HEIGHT = 0.25  # m, of the base; the hips walk at 0.395 m or higher
 SETTLE = 0.3  # s, before the first step, for feet and payload to come to rest
+SETTLE_POSE = 1.0  # s, likewise on a slope or in another pose, where the robot rocks first
 SETTLE_STIFFNESS = 420.0  # Nm/rad: what TDE at 1 ms has, Kd m_bar / L
 SETTLE_DAMPING = 10.0  # Nm s/rad
 MAX_SPEED = 200.0  # rad/s, bound of observed joint speeds
@@ -284,7 +285,8 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         for entry in realised.get("initial_pose", ()):
             pose[joints.index(entry["joint"])] += entry["offset"]
         at_rest = realised.keys().isdisjoint(("payload", "friction", "slope", "mass_error", "initial_pose"))
-        tau = self._still if at_rest else self._settle(pose)
+        rocks = not realised.keys().isdisjoint(("slope", "initial_pose"))
+        tau = self._still if at_rest else self._settle(pose, SETTLE_POSE if rocks else SETTLE)
         self._actuation = self._sensing = None
         if not realised.keys().isdisjoint(Actuation.KINDS):
             self._actuation = Actuation(realised, joints, TIME_STEP)
@@ -293,14 +295,14 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
             self._sensing = Sensing(realised, OBSERVATION, self.control_period, self.np_random)
         return tau
 
-    def _settle(self, pose: Array) -> Array:
+    def _settle(self, pose: Array, duration: float = SETTLE) -> Array:
         """Stand still under springs on the joints; returns the torques in the end.
 
         Springs share the load of the two legs evenly. A rigid hold would not: the legs and the ground are a closed
         chain, in which any start error turns into antagonistic torques of several Nm.
         """
         tau = self._stand
-        for _ in range(round(SETTLE / TIME_STEP)):
+        for _ in range(round(duration / TIME_STEP)):
             state = self._engine.read()
             tau = self._stand + SETTLE_STIFFNESS * (pose - state.q) - SETTLE_DAMPING * state.qd
             self._engine.step(tau)

@@ -52,8 +52,9 @@ def episode_metrics(recording: Recording) -> dict[str, Any]:
     - `saturation`: share of samples with a joint at its limit.
     - `energy_j`: integral of sum |tau qd|; `cost_of_transport`: energy / (m g distance), NaN below 0.1 m.
     - `tde_error_rms`: root mean square of sigma (rad/s^2).
-    - `recovery_time_s`: the longest time from a push's end until the joint error (RMS over joints) stays for 1 s within
-      0.5 degrees, or within its largest value in the 2 s before the push if that is more; infinite if it never does.
+    - `recovery_time_s_push0`, ...: time from the end of each push until the joint error (RMS over joints) stays for 1 s
+      within 0.5 degrees, or within its largest value in the 2 s before the push if that is more; infinite if it never
+      does.
     """
     fields, period = recording.fields, recording.period
     error = fields["q_ref"] - fields["q"]
@@ -67,6 +68,8 @@ def episode_metrics(recording: Recording) -> dict[str, Any]:
     for number, (start, end) in enumerate(recording.phases, start=1):
         last = len(error) if end == float("inf") else round(end / period)
         metrics |= _axis_metrics(recording, round(start / period), last, f"phase{number}_")
+    for number, push in enumerate(recording.pushes):
+        metrics[f"recovery_time_s_push{number}"] = recovery_time(error, period, *push)
     sigma = recording.sigma
     return metrics | {
         "rmse_deg": float(np.degrees(_rms(error))),
@@ -77,9 +80,6 @@ def episode_metrics(recording: Recording) -> dict[str, Any]:
         "energy_j": energy,
         "cost_of_transport": energy / (recording.mass * GRAVITY * distance) if distance > 0.1 else float("nan"),
         "tde_error_rms": float("nan") if sigma is None else _rms(sigma),
-        "recovery_time_s": max(
-            (recovery_time(error, period, *push) for push in recording.pushes), default=float("nan")
-        ),
     }
 
 

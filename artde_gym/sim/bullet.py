@@ -10,6 +10,7 @@ corrupts the first.
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import tempfile
 import weakref
@@ -74,8 +75,8 @@ class BulletEngine:
         self._robot = self._build_robot()
         self._com = spec.base.com
         self._mass_factor = 1.0
-        self._friction: float | None = None
-        self._friction_at: dict[int, float | None] = {}  # of the contacts in each snapshot
+        self._friction = math.nan
+        self._friction_at: dict[int, float] = {}  # of the contacts in each snapshot
         self._payload: int | None = None  # body
         self._holder: int | None = None  # constraint
 
@@ -151,9 +152,7 @@ class BulletEngine:
 
     def restore(self, snapshot: int) -> None:
         self._remove_payload()  # Bullet restores only a world with the same bodies
-        friction = self._friction_at[snapshot]
-        if friction is not None:
-            self.set_friction(friction)
+        self._set_foot_friction(self._friction_at[snapshot])
         bullet.restoreState(snapshot, physicsClientId=self._client)
 
     def read(self) -> State:
@@ -228,10 +227,19 @@ class BulletEngine:
     def set_friction(self, coefficient: float) -> None:
         if coefficient == self._friction:
             return
+        self._set_foot_friction(coefficient)
+        # a contact point keeps the coefficient that it was born with: lift the robot for a moment, so that all are new
+        client: dict[str, Any] = {"physicsClientId": self._client}
+        center, quat = bullet.getBasePositionAndOrientation(self._robot, **client)
+        velocity, spin = bullet.getBaseVelocity(self._robot, **client)
+        bullet.resetBasePositionAndOrientation(self._robot, np.add(center, (0.0, 0.0, 10.0)).tolist(), quat, **client)
+        bullet.performCollisionDetection(**client)
+        bullet.resetBasePositionAndOrientation(self._robot, center, quat, **client)
+        bullet.resetBaseVelocity(self._robot, velocity, spin, **client)
+
+    def _set_foot_friction(self, coefficient: float) -> None:
         for foot in self._feet:
             bullet.changeDynamics(self._robot, foot, lateralFriction=coefficient, physicsClientId=self._client)
-            # contact points keep the coefficient that they were born with: new ones, by way of a new broadphase proxy
-            bullet.setCollisionFilterGroupMask(self._robot, foot, 1, -1, physicsClientId=self._client)
         self._friction = coefficient
 
     def attach_payload(self, mass: float, position: Vector) -> None:

@@ -148,39 +148,6 @@ def test_ground_carries_robot_and_payload(mass: float) -> None:
     assert load == pytest.approx((8.986 + mass) * 9.81, rel=0.01)
 
 
-def test_push_changes_momentum_by_its_impulse() -> None:
-    """In free fall, so that nothing else acts from the side: sum over all links of m v from the tree's own algebra."""
-    from artde_gym.robots.dynamics import RigidBodyTree
-    from artde_gym.robots.ojas import ojas
-    from artde_gym.sim.bullet import BulletEngine
-
-    spec = ojas("lumped")
-    engine, tree = BulletEngine(spec), RigidBodyTree(spec)
-    engine.place((0.0, 0.0, 5.0), np.zeros(12))
-
-    def momentum() -> np.ndarray:
-        state = engine.read()
-        x, y, z, w = state.quat_xyzw
-        rot = np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-            ]
-        )
-        velocity = np.concatenate([state.velocity, state.angular_velocity, state.qd])
-        return (tree.mass_matrix(state.q, rot) @ velocity)[:3]
-
-    before = momentum()
-    for _ in range(100):
-        engine.push("chest", (30.0, -20.0, 10.0))
-        engine.step(np.zeros(12))
-    change = momentum() - before
-    expected = 0.1 * np.array([30.0, -20.0, 10.0 - 9.81 * 8.986])
-    np.testing.assert_allclose(change, expected, rtol=2e-3, atol=2e-3)
-    engine.close()
-
-
 def test_saturation_is_what_the_observation_reports() -> None:
     env = make(disturbances={})
     env.reset(seed=0)

@@ -2,6 +2,7 @@
 
 import json
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from artde_gym.disturbances import KINDS, Disturbances
-from artde_gym.disturbances.kinds import Kind, Parameter
+from artde_gym.disturbances.kinds import Kind, Parameter, page
 from artde_gym.errors import DisturbanceError
 
 SITES = ("torso", "chest", "left_arm", "right_arm")
@@ -344,3 +345,9 @@ def test_whatever_is_given_for_one_parameter_is_read_or_refused(name, value):
     else:
         check_realised(realised)
     assert not field or parameter in field
+
+
+def test_the_page_of_the_documentation_is_the_schema():
+    """Mend with `python -m artde_gym.disturbances > docs/disturbances.md`."""
+    stored = Path(__file__).parents[2] / "docs" / "disturbances.md"
+    assert stored.read_text(encoding="utf-8") == page()
