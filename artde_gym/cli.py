@@ -206,6 +206,7 @@ class Display:
 
     def __init__(self, console: Console) -> None:
         self._running: dict[tuple[str, str, int], float] = {}
+        self._what = "episodes"
         self._progress = Progress(
             TextColumn("{task.fields[what]}"),
             BarColumn(),
@@ -220,11 +221,15 @@ class Display:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._progress.update(self._bar, description="")
-        self._progress.stop()
+        if self._progress.live.is_started:
+            self._progress.update(self._bar, description="")
+            self._progress.stop()
 
     def __call__(self, update: Update, what: str = "episodes") -> None:
         self._progress.start()  # with the first news; an error before it leaves no empty bar
+        if what != self._what:
+            self._what = what
+            self._progress.reset(self._bar)  # a bar that was full once has stopped its clock
         key = (update.task.cell.name, update.task.controller, update.task.episode)
         self._running[key] = update.time_s
         if update.ended:

@@ -213,6 +213,10 @@ def _cells(
     kwargs: dict[str, Any],
     disturbances: Mapping[str, Any] | None,
 ) -> list[Cell]:
+    if "disturbances" in kwargs:
+        raise OptionError(
+            "env_kwargs", "disturbances", "environment arguments; disturbances have an argument of their own"
+        )
     if names is None:
         own = {} if disturbances is None else {"disturbances": dict(disturbances)}
         return [Cell(CUSTOM, env_id or DEFAULT_ENVIRONMENT, {**kwargs, **own})]
@@ -318,6 +322,15 @@ class _StoppedError(Exception):
 
 def _start_worker(channel: Any, stop: Any) -> None:
     _worker.update(channel=channel, stop=stop)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """Workers hold each other's pipes open, so that none would notice a parent that was killed."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _run_in_worker(index: int, task: Task) -> Episode:

@@ -40,7 +40,8 @@ class Store:
     def __init__(self, folder: Path, configuration: Mapping[str, Any]) -> None:
         self.folder = folder
         self._configuration = json.loads(json.dumps(configuration))
-        self._claim()
+        if claim(self.folder, "summary.json", self._configuration):
+            self._write_record(None)
         self.rows = self._read_rows()
         self._columns = list(self.rows[0]) if self.rows else []
 
@@ -68,27 +69,6 @@ class Store:
         self._rewrite()
         write_atomically(self.folder / "summary.csv", lambda file: summary.to_csv(file))
         self._write_record(summary)
-
-    def _claim(self) -> None:
-        record = self.folder / "summary.json"
-        if record.exists():
-            try:
-                found = json.loads(record.read_text(encoding="utf-8"))["configuration"]
-            except (OSError, ValueError, KeyError, TypeError) as error:
-                raise StoreError(
-                    "output folder", str(self.folder), "a folder whose summary.json can be read"
-                ) from error
-            if found != self._configuration:
-                differs = [
-                    key for key in {*found, *self._configuration} if found.get(key) != self._configuration.get(key)
-                ]
-                allowed = f"a new folder; this one holds other results (different: {', '.join(sorted(differs))})"
-                raise StoreError("output folder", str(self.folder), allowed)
-            return
-        if self.folder.exists() and (not self.folder.is_dir() or any(self.folder.iterdir())):
-            raise StoreError("output folder", str(self.folder), "a new or empty folder; this one holds something else")
-        self.folder.mkdir(parents=True, exist_ok=True)
-        self._write_record(None)
 
     def _write_record(self, summary: pd.DataFrame | None) -> None:
         record = {
@@ -125,6 +105,29 @@ class Store:
         lines = [_line(self._columns)]
         lines += [_line([row.get(column, "") for column in self._columns]) for row in self.rows]
         write_atomically(self.folder / "episodes.csv", lambda file: file.write("".join(lines).encode()))
+
+
+def claim(folder: Path, record: str, configuration: Mapping[str, Any]) -> bool:
+    """Make `folder` and return True, or return False if its `record` (a file name) holds this configuration already.
+
+    Raises:
+        StoreError: if the folder holds anything else than results of the same configuration.
+    """
+    path = folder / record
+    if path.exists():
+        try:
+            found = json.loads(path.read_text(encoding="utf-8"))["configuration"]
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise StoreError("output folder", str(folder), f"a folder whose {record} can be read") from error
+        if found != configuration:
+            differs = [key for key in {*found, *configuration} if found.get(key) != configuration.get(key)]
+            allowed = f"a new folder; this one holds other results (different: {', '.join(sorted(differs))})"
+            raise StoreError("output folder", str(folder), allowed)
+        return False
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise StoreError("output folder", str(folder), "a new or empty folder; this one holds something else")
+    folder.mkdir(parents=True, exist_ok=True)
+    return True
 
 
 def write_atomically(path: Path, write: Callable[[BinaryIO], Any]) -> None:

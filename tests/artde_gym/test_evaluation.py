@@ -236,6 +236,7 @@ def test_gains_reach_the_controller() -> None:
         ({"trace_hz": 0.0}, OptionError, ["trace_hz"]),
         ({"env_kwargs": {"durration": 1}}, OptionError, ["durration", "duration"]),
         ({"env_kwargs": {"control_period": 0.0011}}, OptionError, ["control_period", "0.0011"]),
+        ({"env_kwargs": {"disturbances": {}}}, OptionError, ["env_kwargs", "disturbances"]),
         ({"env_kwargs": {"speed": {1}}}, OptionError, ["env_kwargs", "JSON"]),
         ({"disturbances": {"payload": float("inf")}}, DisturbanceError, ["payload.mass", "inf"]),
     ],
@@ -375,6 +376,38 @@ def test_a_mistake_is_one_line_and_exit_code_2(arguments: list[str], words: list
     assert len(outcome.stderr.strip().splitlines()) == 1
     for word in words:
         assert word in outcome.stderr
+
+
+def workers_of(pid: int) -> list[int]:
+    children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    return [int(child) for child in children]
+
+
+def alive(pid: int) -> bool:
+    try:
+        return "Z" not in Path(f"/proc/{pid}/stat").read_text().split(")")[1].split()[0]
+    except FileNotFoundError:
+        return False
+
+
+def test_workers_end_with_a_parent_that_was_killed(tmp_path: Path) -> None:
+    arguments = ["evaluate", "--scenario", "S2", "--controllers", "tde", "--episodes", "500", "--workers", "2"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "artde_gym.cli", *arguments, "--out", str(tmp_path / "run")],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    workers: list[int] = []
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline and len(workers) < 3:  # two and multiprocessing's resource tracker
+        time.sleep(0.1)
+        workers = workers_of(process.pid)
+    time.sleep(3.0)  # into their first episodes
+    process.kill()
+    process.wait()
+    while time.monotonic() < deadline and any(map(alive, workers)):
+        time.sleep(0.1)
+    assert not any(map(alive, workers))
 
 
 def test_ctrl_c_keeps_every_finished_episode(tmp_path: Path) -> None:
