@@ -20,7 +20,7 @@ test: check  ## all checks, then all tests (a selection: ARGS=...)
 check: .venv/dev  ## format, lint, types and import contracts
 	$(BIN)/ruff format --check
 	$(BIN)/ruff check
-	$(BIN)/basedpyright
+	$(BIN)/basedpyright --pythonpath $(BIN)/python
 	$(BIN)/lint-imports
 
 format: .venv/dev  ## format and mend what can be mended

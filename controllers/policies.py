@@ -100,7 +100,7 @@ class TrackingPolicy:
                 state = _choose(fresh, self.start(signals), state)
         force, state = self.step(state, signals, given)
         clipped = np.minimum(np.maximum(force, self._low), self._high)
-        return clipped.astype(force.dtype, copy=False), state
+        return clipped if clipped.dtype == force.dtype else clipped.astype(force.dtype), state
 
     def diagnostics(self, state: Memory) -> dict[str, Array]:
         """What the memory tells of the law's inside, by name: sigma, s, beta, c, ..., as far as it has them."""

@@ -314,7 +314,7 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         events: list[str] = []
         actuation, applied = self._actuation, command
         target = command if actuation is None else actuation.target(command)
-        total = np.zeros(N_JOINTS)
+        total = 0.0
         for step in range(first, first + self._substeps):
             events += self._schedule.apply(step, engine)
             if self._pulse is not None:
@@ -326,7 +326,7 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
                 total = total + applied
             engine.step(applied)
         # the mean torque of the period belongs to its mean acceleration
-        self._tau = command if actuation is None else total / self._substeps
+        self._tau = command if actuation is None else np.asarray(total / self._substeps)
         return events
 
     def _measure(self, info: dict[str, Any]) -> Array:

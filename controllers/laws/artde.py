@@ -93,7 +93,7 @@ def artde_start(gains: ArtdeGains, signals: Signals, period: float) -> ArtdeMemo
 
 
 def artde(
-    gains: ArtdeGains, memory: ArtdeMemory, signals: Signals, period: float, du: Array | float = 0.0
+    gains: ArtdeGains, memory: ArtdeMemory, signals: Signals, period: float, du: Array | None = None
 ) -> tuple[Array, ArtdeMemory]:
     """One sample of the law at the top; `du` (..., n) is added to the robust term."""
     e, ed = errors(signals)
@@ -102,8 +102,8 @@ def artde(
     xi = np.sqrt(inner(e, e) + inner(ed, ed))
     c = memory.beta_0 + memory.beta_1 * xi
     robust = (gains.alpha * c / np.sqrt(s_squared + gains.eps))[..., None] * s
-    u = desired_acceleration(signals, e, ed, gains.k_p, gains.k_d) + robust + du
-    tau, memory_tde = time_delay(gains.m_bar, memory.tde, signals, u, period)
+    u = desired_acceleration(signals, e, ed, gains.k_p, gains.k_d) + robust
+    tau, memory_tde = time_delay(gains.m_bar, memory.tde, signals, u if du is None else u + du, period)
     return tau, ArtdeMemory(memory_tde, s, *_adapt(gains, memory, s, s_squared, xi, period))
 
 
@@ -117,7 +117,7 @@ def _adapt(
         grows = s_squared > before
         weight = 0.5 * (weight + np.sqrt(before))
     else:
-        grows = inner(s, s - memory.s) > 0
+        grows = s_squared > inner(s, memory.s)  # s_k^T (s_k - s_k-1) > 0
     if not gains.clamp:
         grows = grows | (memory.beta_0 <= gains.beta_floor) | (memory.beta_1 <= gains.beta_floor)
     step = period * weight

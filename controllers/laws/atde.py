@@ -73,7 +73,7 @@ def atde_start(gains: AtdeGains, signals: Signals, period: float) -> AtdeMemory:
 
 
 def atde(
-    gains: AtdeGains, memory: AtdeMemory, signals: Signals, period: float, du: Array | float = 0.0
+    gains: AtdeGains, memory: AtdeMemory, signals: Signals, period: float, du: Array | None = None
 ) -> tuple[Array, AtdeMemory]:
     """One sample of the law at the top; `du` (..., n) is added to the robust term."""
     e, ed = errors(signals)
@@ -82,6 +82,6 @@ def atde(
     robust = (gains.alpha * memory.c / np.sqrt(s_squared + gains.eps))[..., None] * s
     grows = (memory.c <= gains.c_floor) | (s_squared > inner(memory.s, memory.s))
     step = (period * gains.gamma_0) * np.sqrt(s_squared)
-    u = desired_acceleration(signals, e, ed, gains.k_p, gains.k_d) + robust + du
-    tau, memory_tde = time_delay(gains.m_bar, memory.tde, signals, u, period)
+    u = desired_acceleration(signals, e, ed, gains.k_p, gains.k_d) + robust
+    tau, memory_tde = time_delay(gains.m_bar, memory.tde, signals, u if du is None else u + du, period)
     return tau, AtdeMemory(memory_tde, s, memory.c + np.where(grows, step, -step))

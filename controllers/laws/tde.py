@@ -89,11 +89,11 @@ def tde_start(signals: Signals, period: float) -> TdeMemory:
 
 
 def tde(
-    gains: TdeGains, memory: TdeMemory, signals: Signals, period: float, du: Array | float = 0.0
+    gains: TdeGains, memory: TdeMemory, signals: Signals, period: float, du: Array | None = None
 ) -> tuple[Array, TdeMemory]:
     """One sample of the law at the top; `du` (..., n) is whatever is added to the desired acceleration (rad/s^2)."""
-    u = desired_acceleration(signals, *errors(signals), gains.k_p, gains.k_d) + du
-    return time_delay(gains.m_bar, memory, signals, u, period)
+    u = desired_acceleration(signals, *errors(signals), gains.k_p, gains.k_d)
+    return time_delay(gains.m_bar, memory, signals, u if du is None else u + du, period)
 
 
 def time_delay(m_bar: Inertia, memory: TdeMemory, signals: Signals, u: Array, period: float) -> tuple[Array, TdeMemory]:
@@ -149,8 +149,8 @@ def equivalent_gains(gains: ConstantGains) -> TdeGains:
 
 
 def constant_gain_tde(
-    gains: ConstantGains, memory: TdeMemory, signals: Signals, period: float, du: Array | float = 0.0
+    gains: ConstantGains, memory: TdeMemory, signals: Signals, period: float, du: Array | None = None
 ) -> tuple[Array, TdeMemory]:
     """TDE with du = alpha c s / sqrt(|s|^2 + eps)."""
     robust = (gains.alpha * gains.c) * smooth_sign(sliding_variable(*errors(signals), gains.k_p, gains.k_d), gains.eps)
-    return tde(gains, memory, signals, period, robust + du)
+    return tde(gains, memory, signals, period, robust if du is None else robust + du)
