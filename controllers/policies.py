@@ -6,6 +6,7 @@ arrays with the observations' leading axes, so that one policy object serves any
 
 from __future__ import annotations
 
+import abc
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -44,7 +45,7 @@ class Plant(NamedTuple):
         return cls(*(read(name) for name in names))
 
 
-class TrackingPolicy:
+class TrackingPolicy(abc.ABC):
     """A tracking law on the environment's observations; subclasses say what happens in one sample.
 
     Args:
@@ -61,13 +62,13 @@ class TrackingPolicy:
         box = plant.action.box()
         self._low, self._high = box.low, box.high
 
+    @abc.abstractmethod
     def start(self, signals: Signals) -> Memory:
         """Memory before the first sample."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def step(self, memory: Any, signals: Signals, observation: Array) -> tuple[Array, Memory]:
         """One sample: force (..., n) before saturation, and the memory for the next one."""
-        raise NotImplementedError
 
     def predict(
         self,
