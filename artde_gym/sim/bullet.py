@@ -51,6 +51,8 @@ PAYLOAD_FORCE = 1e5  # N, likewise
 PAYLOAD_RADIUS = 0.08  # m: it shows on either side of the torso
 HOLD_TORQUE = 100.0  # Nm, of the motors that hold joints which nobody actuates
 
+_ORIGIN = (0.0, 0.0, 0.0)
+
 
 class BulletEngine:
     """One robot on a plane in a Bullet world of its own."""
@@ -157,26 +159,44 @@ class BulletEngine:
 
     def read(self) -> State:
         client = self._client
-        states = bullet.getJointStates(self._robot, self._joints, physicsClientId=client)
+        states = bullet.getJointStates(self._robot, self._joints, physicsClientId=client) if self._joints else ()
         center, quat = bullet.getBasePositionAndOrientation(self._robot, physicsClientId=client)
         velocity, spin = bullet.getBaseVelocity(self._robot, physicsClientId=client)
-        ax, ay, az = self._arm(quat)
-        wx, wy, wz = spin
+        arm = self._arm(quat)
         return State(
             np.array([state[0] for state in states]),
             np.array([state[1] for state in states]),
-            (center[0] - ax, center[1] - ay, center[2] - az),
+            (center[0] - arm[0], center[1] - arm[1], center[2] - arm[2]),
             quat,
-            # v_origin = v_com - w x arm
-            (velocity[0] - wy * az + wz * ay, velocity[1] - wz * ax + wx * az, velocity[2] - wx * ay + wy * ax),
+            _velocity_of_origin(velocity, spin, arm),
             spin,
         )
 
+    def base_twist(self) -> tuple[Vector, Vector]:
+        velocity, spin = bullet.getBaseVelocity(self._robot, physicsClientId=self._client)
+        if not any(self._com):
+            return velocity, spin
+        _, quat = bullet.getBasePositionAndOrientation(self._robot, physicsClientId=self._client)
+        return _velocity_of_origin(velocity, spin, self._arm(quat)), spin
+
     def step(self, tau: Array) -> None:
-        bullet.setJointMotorControlArray(
-            self._robot, self._joints, bullet.TORQUE_CONTROL, forces=tau.tolist(), physicsClientId=self._client
-        )
+        if self._joints:
+            bullet.setJointMotorControlArray(
+                self._robot, self._joints, bullet.TORQUE_CONTROL, forces=tau.tolist(), physicsClientId=self._client
+            )
         bullet.stepSimulation(physicsClientId=self._client)
+
+    def push_base(self, force: Vector, torque: Vector, *, body_axes: bool) -> None:
+        client = self._client
+        if body_axes:
+            # along the base's axes both act at the origin of Bullet's base frame, its centre of mass
+            bullet.applyExternalForce(self._robot, -1, force, _ORIGIN, bullet.LINK_FRAME, physicsClientId=client)
+            bullet.applyExternalTorque(self._robot, -1, torque, bullet.LINK_FRAME, physicsClientId=client)
+            return
+        center, _ = bullet.getBasePositionAndOrientation(self._robot, physicsClientId=client)
+        bullet.applyExternalForce(self._robot, -1, force, center, bullet.WORLD_FRAME, physicsClientId=client)
+        if any(torque):
+            bullet.applyExternalTorque(self._robot, -1, torque, bullet.WORLD_FRAME, physicsClientId=client)
 
     def push(self, site: str, force: Vector) -> None:
         for name, link, offset in self.spec.sites:
@@ -310,6 +330,12 @@ class BulletEngine:
             return state.position, state.quat_xyzw
         state = bullet.getLinkState(self._robot, index, computeForwardKinematics=1, physicsClientId=self._client)
         return state[4], state[5]
+
+
+def _velocity_of_origin(velocity: Vector, spin: Vector, arm: Vector) -> Vector:
+    """v_origin = v_com - w x arm, in plain floats, since this runs every step."""
+    (vx, vy, vz), (wx, wy, wz), (ax, ay, az) = velocity, spin, arm
+    return vx - wy * az + wz * ay, vy - wz * ax + wx * az, vz - wx * ay + wy * ax
 
 
 def _rotation(quat_xyzw: tuple[float, float, float, float]) -> Array:

@@ -61,8 +61,19 @@ class Engine(Protocol):
         """The state now."""
         ...
 
+    def base_twist(self) -> tuple[Vector, Vector]:
+        """Velocity of the base link's origin (m/s) and angular velocity (rad/s), world axes: a cheap part of `read`."""
+        ...
+
     def step(self, tau: Array) -> None:
         """Advance one `time_step` under joint torques `tau` (n,) (Nm)."""
+        ...
+
+    def push_base(self, force: Vector, torque: Vector, *, body_axes: bool) -> None:
+        """Add a force (N) at the base link's centre of mass and a torque (Nm), for the next step only.
+
+        Both along the base's own axes or along the world's.
+        """
         ...
 
     def push(self, site: str, force: Vector) -> None:
