@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
+import operator
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Literal
 
@@ -191,6 +192,7 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         self.observation_layout = Layout((*OBSERVATION.fields, GROUND_FORCE)) if observe_ground_force else OBSERVATION
         self.observation_space = self.observation_layout.box()
         self.action_space = ACTION.box()
+        self._low, self._high = self.action_space.low, self.action_space.high
         hip_height = robot.ANKLE_HEIGHT + hip_height_above_ankle(speed)
         start, rest = self.pattern.q[0], np.zeros(N_JOINTS)
         self._stand = Supported(self.nominal_robot).torque(0.5, start, rest, rest)
@@ -230,12 +232,12 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         if not math.isfinite(action.dot(action)):
             raise ActionError("action", action.tolist(), "finite torques (Nm)")
         previous = self._tau
-        events = self._simulate(np.minimum(np.maximum(action, -robot.TORQUE_LIMIT), robot.TORQUE_LIMIT))
+        events = self._simulate(np.minimum(np.maximum(action, self._low), self._high))
         self._k += 1
         info: dict[str, Any] = {"time_s": self._k * self.control_period}
         observation = self._measure(info)
         terms = info["reward_terms"] = self._reward_terms(previous)
-        reward = self.control_period * sum([REWARD_SCALES[name] * value for name, value in terms.items()])
+        reward = self.control_period * sum(map(operator.mul, REWARD_SCALES.values(), terms.values()))
         if events:
             info["events"] = events
         fall = self._fall()
@@ -347,9 +349,9 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         error = self._plan[self._k, :N_JOINTS] - self._state.q
         change = self._tau - previous
         roll, pitch = self._tilt
-        return {
+        return {  # in the order of REWARD_SCALES
             "alive": 1.0,
-            "tracking": math.exp(-float(error.dot(error)) / 0.02),
+            "tracking": math.exp(-error.dot(error) / 0.02),
             "upright": math.exp(-(roll * roll + pitch * pitch) / 0.05),
             "effort": float(self._tau.dot(self._tau)) * _EFFORT_SCALE,
             "smoothness": float(change.dot(change)) * _EFFORT_SCALE,

@@ -49,6 +49,7 @@ BARE_ITERATIONS = 50
 GEAR_FORCE = 1e6  # N, more than any gear carries
 PAYLOAD_FORCE = 1e5  # N, likewise
 PAYLOAD_RADIUS = 0.08  # m: it shows on either side of the torso
+PAYLOAD_COLOUR = (0.85, 0.45, 0.1, 1.0)
 HOLD_TORQUE = 100.0  # Nm, of the motors that hold joints which nobody actuates
 
 _ORIGIN = (0.0, 0.0, 0.0)
@@ -75,6 +76,9 @@ class BulletEngine:
         )
         self._ground = self._build_ground()
         self._robot = self._build_robot()
+        self._ball = bullet.createVisualShape(  # once: Bullet never frees a visual shape
+            bullet.GEOM_SPHERE, radius=PAYLOAD_RADIUS, rgbaColor=PAYLOAD_COLOUR, physicsClientId=self._client
+        )
         self._com = spec.base.com
         self._mass_factor = 1.0
         self._friction = math.nan
@@ -160,12 +164,14 @@ class BulletEngine:
     def read(self) -> State:
         client = self._client
         states = bullet.getJointStates(self._robot, self._joints, physicsClientId=client) if self._joints else ()
+        n = len(states)
+        joints = np.array([state[0] for state in states] + [state[1] for state in states])  # one array is faster
         center, quat = bullet.getBasePositionAndOrientation(self._robot, physicsClientId=client)
         velocity, spin = bullet.getBaseVelocity(self._robot, physicsClientId=client)
         arm = self._arm(quat)
         return State(
-            np.array([state[0] for state in states]),
-            np.array([state[1] for state in states]),
+            joints[:n],
+            joints[n:],
             (center[0] - arm[0], center[1] - arm[1], center[2] - arm[2]),
             quat,
             _velocity_of_origin(velocity, spin, arm),
@@ -268,10 +274,7 @@ class BulletEngine:
         center, quat = bullet.getBasePositionAndOrientation(self._robot, **client)
         offset = np.subtract(position, self._com)
         point = np.asarray(center) + _rotation(quat) @ offset
-        visual = bullet.createVisualShape(
-            bullet.GEOM_SPHERE, radius=PAYLOAD_RADIUS, rgbaColor=[0.85, 0.45, 0.1, 1.0], **client
-        )
-        body = bullet.createMultiBody(mass, -1, visual, point.tolist(), quat, **client)
+        body = bullet.createMultiBody(mass, -1, self._ball, point.tolist(), quat, **client)
         moment = 0.4 * mass * PAYLOAD_RADIUS**2
         bullet.changeDynamics(
             body, -1, localInertiaDiagonal=[moment] * 3, linearDamping=0.0, angularDamping=0.0, **client

@@ -30,6 +30,7 @@ from controllers.laws.tracking import (
     errors,
     inner,
     is_finite,
+    signed_step,
     sliding_variable,
 )
 
@@ -120,8 +121,7 @@ def _adapt(
         grows = s_squared > inner(s, memory.s)  # s_k^T (s_k - s_k-1) > 0
     if not gains.clamp:
         grows = grows | (memory.beta_0 <= gains.beta_floor) | (memory.beta_1 <= gains.beta_floor)
-    step = period * weight
-    signed = np.where(grows, step, -step)
+    signed = signed_step(period * weight, grows)
 
     def moved(beta: Array, change: Array) -> Array:
         if gains.leakage:

@@ -27,6 +27,7 @@ from controllers.laws.tracking import (
     errors,
     inner,
     is_finite,
+    signed_step,
     sliding_variable,
 )
 
@@ -81,7 +82,7 @@ def atde(
     s_squared = inner(s, s)
     robust = (gains.alpha * memory.c / np.sqrt(s_squared + gains.eps))[..., None] * s
     grows = (memory.c <= gains.c_floor) | (s_squared > inner(memory.s, memory.s))
-    step = (period * gains.gamma_0) * np.sqrt(s_squared)
+    change = signed_step((period * gains.gamma_0) * np.sqrt(s_squared), grows)
     u = desired_acceleration(signals, e, ed, gains.k_p, gains.k_d) + robust
     tau, memory_tde = time_delay(gains.m_bar, memory.tde, signals, u if du is None else u + du, period)
-    return tau, AtdeMemory(memory_tde, s, memory.c + np.where(grows, step, -step))
+    return tau, AtdeMemory(memory_tde, s, memory.c + change)
