@@ -39,7 +39,8 @@ def mjcf(spec: RobotSpec) -> str:
     # dense, as `auto` chooses at this size too: MuJoCo 4.0.0 factorises sparse Hessians wrongly (its issue 3767)
     solver = {"integrator": "implicitfast", "solver": "Newton", "jacobian": "dense", "cone": "elliptic"}
     option = ET.SubElement(root, "option", solver, impratio="10")
-    ET.SubElement(option, "flag", autoreset="disable")  # a state that diverges must not jump back to the start
+    # a state that diverges must not jump back to the start; one robot needs no search for independent islands
+    ET.SubElement(option, "flag", autoreset="disable", island="disable")
     default = ET.SubElement(root, "default")
     ET.SubElement(default, "geom", contype="0", conaffinity="0")
     soft = {"solref": numbers((CONTACT_TIME, 1.0)), "solimp": numbers(IMPEDANCE)}
