@@ -27,6 +27,7 @@ from artde_gym.robots.ojas import ActuatorInertia, ojas
 from artde_gym.robots.support import Supported
 from artde_gym.sim.engine import Camera, Engine, State
 from artde_gym.sim.factory import EngineName, make_engine
+from artde_gym.tracking import Effort, Tracked, Tracking
 
 TIME_STEP = 0.001  # s, of the physics
 FRICTION = 0.8  # of feet and ground
@@ -71,6 +72,19 @@ ACTION = Layout(
     (Field("tau", N_JOINTS, "Nm", -robot.TORQUE_LIMIT, robot.TORQUE_LIMIT, "leg joint torques, left then right"),)
 )
 FOOT_SITES = ("left_foot", "right_foot")
+
+_RIGHT_LEG = {f"q{i + 1}": N_JOINTS // 2 + i for i in range(N_JOINTS // 2)}  # what the thesis' tables show
+TRACKING = Tracking(
+    errors=(Tracked("deg", 180.0 / math.pi, _RIGHT_LEG, lambda fields: fields["q_ref"] - fields["q"]),),
+    norm=False,
+    band=math.radians(0.5),
+    efforts=(Effort("torque", "nm", "tau_applied", slice(N_JOINTS), _RIGHT_LEG),),
+    power=lambda fields: np.abs(fields["tau_applied"] * fields["qd"]).sum(axis=-1),
+    limited="tau_applied",
+    near=0.0,
+    tde_errors={"tde_error_rms": "sigma"},
+    speed=lambda fields: fields["base_velocity"][..., 0],
+)
 
 REWARD_SCALES: dict[str, float] = {
     "alive": 1.0,
@@ -158,8 +172,7 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
     default_disturbances: ClassVar[Mapping[str, Any]] = {}
     action_layout = ACTION
     robot_name = "ojas"
-    reported_axes: ClassVar[dict[str, int]] = {f"q{i + 1}": N_JOINTS // 2 + i for i in range(N_JOINTS // 2)}
-    """Columns of q that tables show: the right leg, as in the thesis."""
+    tracking = TRACKING
 
     def __init__(
         self,

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from artde_gym.arrays import Array
 from artde_gym.layout import Field, Layout
 from artde_gym.robots import q450 as robot
+from artde_gym.tracking import Effort, Fields, Tracked, Tracking
 
 GRID = 0.005  # s: control periods are whole multiples of it; the air is sampled on it
 DURATION = 70.0  # s
@@ -52,3 +56,38 @@ ACTION = Layout(
         ),
     )
 )
+
+AIR_DENSITY = 1.225  # kg/m^3
+
+
+def _heading_error(fields: Fields) -> Array:
+    """All that the observation tells of (phi, theta, psi): the other two references are the policy's own."""
+    rot = fields["rot_body_to_world"]
+    error = fields["yaw_ref"][..., 0] - np.arctan2(rot[..., 3], rot[..., 0])
+    unknown = np.full_like(error, np.nan)
+    return np.stack([unknown, unknown, (error + math.pi) % (2.0 * math.pi) - math.pi], axis=-1)
+
+
+def _induced_power(fields: Fields) -> Array:
+    """Sum of T^1.5 / sqrt(2 rho A), what ideal rotors need to hover (W)."""
+    disc = math.pi * robot.ROTOR_RADIUS**2
+    return (np.maximum(fields["rotor_thrust"], 0.0) ** 1.5).sum(axis=-1) / math.sqrt(2.0 * AIR_DENSITY * disc)
+
+
+TRACKING = Tracking(
+    errors=(
+        Tracked("m", 1.0, {"x": 0, "y": 1, "z": 2}, lambda fields: fields["position_ref"] - fields["position"]),
+        Tracked("deg", 180.0 / math.pi, {"phi": 0, "theta": 1, "psi": 2}, _heading_error, diagnostic="attitude_error"),
+    ),
+    norm=True,
+    band=0.02,
+    efforts=(
+        Effort("thrust", "n", "wrench_applied", slice(0, 1), {"u1": 0}),
+        Effort("torque", "nm", "wrench_applied", slice(1, 4), {"u2": 0, "u3": 1, "u4": 2}),
+    ),
+    power=_induced_power,
+    limited="rotor_thrust",
+    near=0.01,
+    tde_errors={"tde_error_rms_p": "sigma_p", "tde_error_rms_q": "sigma_q"},
+)
+"""Position and attitude, as in table 3.1 of the thesis; an error of 2 cm counts as recovered."""

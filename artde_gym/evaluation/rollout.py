@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from artde_gym.evaluation.metrics import Recording, episode_metrics
+from artde_gym.evaluation.metrics import Metrics, events_of
 
 Array = NDArray[Any]
 
@@ -47,7 +47,7 @@ def run_episode(
         seed: of the reset; the same seed has the same disturbances whatever the policy.
         options: of the reset.
         trace_hz: rate of the traces, at most the control rate; infinite for every sample.
-        phases: see `Recording`.
+        phases: see `Metrics`.
         on_progress: called with the simulated time (s) about once a simulated second.
     """
     plant = env.unwrapped
@@ -55,6 +55,7 @@ def run_episode(
     stride = max(1, round(1.0 / (trace_hz * period)))
     report_every = max(1, round(PROGRESS_INTERVAL / period))
     diagnose = getattr(policy, "diagnostics", None)
+    diagnosed_every = 1 if plant.tracking.diagnosed else stride
 
     observation, info = env.reset(seed=seed, options=options)
     disturbances = info["disturbances"]
@@ -66,7 +67,7 @@ def run_episode(
         action, state = policy.predict(observation, state=state, episode_start=episode_start, deterministic=True)
         episode_start = False
         count = len(observations)
-        if diagnose is not None and (count - 1) % stride == 0:
+        if diagnose is not None and (count - 1) % diagnosed_every == 0:
             diagnostics.append(diagnose(state))
         observation, reward, terminated, truncated, info = env.step(action)
         total += float(reward)
@@ -76,30 +77,35 @@ def run_episode(
 
     fields = plant.observation_layout.split(np.array(observations))
     inside = _stack(diagnostics)
-    pushes = tuple((push["start"], push["start"] + push["duration"]) for push in disturbances.get("push", ()))
-    recording = Recording(
-        period=period,
-        fields=fields,
-        limit=plant.action_space.high,
-        axes=plant.reported_axes,
-        mass=plant.nominal_robot.mass + disturbances.get("payload", {}).get("mass", 0.0),
-        pushes=pushes,
-        phases=phases,
-        sigma=inside.get("sigma"),
+    metrics = Metrics(
+        plant.tracking, plant.observation_layout, period, [mass(plant, disturbances)], [events_of(disturbances)], phases
     )
+    metrics.add(_one(fields, slice(None, -1)), _one(inside, slice(None)))
+    metrics.add(_one(fields, slice(-1, None)), None)  # nothing was decided there any more
     row = {
         "fell": bool(terminated),
         "fall_reason": info.get("fall_reason", ""),
         "time_to_fall_s": info["time_s"] if terminated else float("nan"),
         "duration_s": info["time_s"],
         "reward": total,
-        **episode_metrics(recording),
+        **metrics.rows()[0],
         **_flatten(disturbances),
     }
     traces = {"time": period * np.arange(0, len(observations), stride)}
     traces.update({name: values[::stride].astype(np.float32) for name, values in fields.items()})
-    traces.update({f"policy.{name}": values.astype(np.float32) for name, values in inside.items()})
+    kept = slice(None, None, stride // diagnosed_every)
+    traces.update({f"policy.{name}": values[kept].astype(np.float32) for name, values in inside.items()})
     return Episode(row, traces)
+
+
+def mass(plant: Any, disturbances: Mapping[str, Any]) -> float:
+    """Of the robot with its payload (kg)."""
+    return plant.nominal_robot.mass + disturbances.get("payload", {}).get("mass", 0.0)
+
+
+def _one(signals: dict[str, Array], part: slice) -> dict[str, Array]:
+    """Samples of one episode as those of one of many."""
+    return {name: values[part, None] for name, values in signals.items()}
 
 
 def _stack(samples: list[dict[str, Array]]) -> dict[str, Array]:
