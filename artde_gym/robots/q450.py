@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
+from typing import TypeVar
 
 import numpy as np
 
@@ -29,6 +30,7 @@ SPIN = (1, -1, 1, -1)  # sign of the reaction torque about z: the front left rot
 PAYLOAD_PLACE: Vector = (0.01, 0.0, -0.10)  # m, where the gripper holds its load
 
 _SIDE = ARM / math.sqrt(2.0)
+_PER_TILT, _PER_TURN = 0.25 / _SIDE, 0.25 / TORQUE_PER_THRUST
 ROTOR_PLACES: tuple[Vector, ...] = (
     (_SIDE, _SIDE, 0.0),
     (-_SIDE, _SIDE, 0.0),
@@ -54,10 +56,31 @@ MAX_WRENCH = (4 * MAX_THRUST, 2 * MAX_THRUST * _SIDE, 2 * MAX_THRUST * _SIDE, 2 
 MIN_WRENCH = (0.0, -MAX_WRENCH[1], -MAX_WRENCH[2], -MAX_WRENCH[3])
 """The least."""
 
+Number = TypeVar("Number", float, Array)
+
 _DARK = (0.16, 0.17, 0.20, 1.0)
 _RED = (0.75, 0.20, 0.18, 1.0)
 _WHITE = (0.90, 0.90, 0.92, 1.0)
 _BLADE = (0.25, 0.27, 0.32, 1.0)
+
+
+def wrench(front_left: Number, rear_left: Number, rear_right: Number, front_right: Number) -> tuple[Number, ...]:
+    """`MIXER` times the rotors' thrusts, elementwise: u1 (N), u2, u3, u4 (Nm)."""
+    left, right = front_left + rear_left, front_right + rear_right
+    rear, front = rear_left + rear_right, front_left + front_right
+    turning, counter_turning = front_left + rear_right, rear_left + front_right
+    return (
+        left + right,
+        _SIDE * (left - right),
+        _SIDE * (rear - front),
+        TORQUE_PER_THRUST * (turning - counter_turning),
+    )
+
+
+def thrusts(u1: Number, u2: Number, u3: Number, u4: Number) -> tuple[Number, ...]:
+    """`ALLOCATION` times a wrench, elementwise: thrusts of the rotors (N), not yet limited."""
+    lift, roll, pitch, yaw = 0.25 * u1, _PER_TILT * u2, _PER_TILT * u3, _PER_TURN * u4
+    return lift + roll - pitch + yaw, lift + roll + pitch - yaw, lift - roll + pitch + yaw, lift - roll - pitch - yaw
 
 
 @functools.cache
@@ -70,7 +93,7 @@ def q450() -> RobotSpec:
 
 
 def _visuals() -> tuple[Box, ...]:
-    """Boxes lie along the axes: an arm, at 45 degrees to them, is a row of small ones, a rotor disc an octagon of three."""
+    """Boxes lie along the axes: an arm, at 45 degrees to them, is a row of small ones; a rotor disc is three flat ones."""
     shapes = [Box((0.11, 0.11, 0.05), (0.0, 0.0, 0.0), _WHITE), Box((0.05, 0.04, 0.03), (0.0, 0.0, -0.04), _DARK)]
     for (x, y, _), colour in zip(ROTOR_PLACES, (_RED, _DARK, _DARK, _RED), strict=True):  # red is ahead
         steps = [0.2 + 0.8 * i / 9 for i in range(10)]

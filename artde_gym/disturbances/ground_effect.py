@@ -1,0 +1,27 @@
+"""Ground effect: a rotor close above the ground lifts more for the same power.
+
+T / T_free = 1 / (1 - (R / 4 h)^2)
+
+with the rotor's radius R and its height h above the ground. Source: I. C. Cheeseman and W. E. Bennett, "The effect of
+the ground on a helicopter rotor in forward flight", ARC R&M 3021, 1955, in hover and for each rotor on its own. It holds
+from h = R / 2 upward; lower rotors gain what they gain there.
+"""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from artde_gym.arrays import Array
+
+Number = TypeVar("Number", float, Array)
+
+LOWEST = 0.5  # radii
+
+
+def thrust_gain(height: Number, radius: float, strength: Number) -> Number:
+    """T / T_free of a rotor of `radius` (m) at `height` (m), the gain over 1 times `strength`; elementwise."""
+    lowest = LOWEST * radius
+    height = 0.5 * (height + lowest + abs(height - lowest))  # the larger one, for numbers and arrays alike
+    ratio = radius / (4.0 * height)
+    square = ratio * ratio
+    return 1.0 + strength * (square / (1.0 - square))
