@@ -18,6 +18,7 @@ from artde_gym.disturbances.actuation import Actuation
 from artde_gym.disturbances.ground import LOADED, GrfPulse
 from artde_gym.disturbances.schedule import Schedule
 from artde_gym.disturbances.sensing import Sensing
+from artde_gym.envs.options import disturbances_in, steps_per_period
 from artde_gym.errors import ActionError, OptionError
 from artde_gym.layout import Field, Layout
 from artde_gym.references.walking import WalkingPattern, hip_height_above_ankle, walking_pattern
@@ -195,7 +196,7 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         model = ojas(actuator_inertia, arms=arms)
         self._sites = [name for name, _, _ in model.sites]
         self._disturbances = self._parse(self.default_disturbances if disturbances is None else disturbances)
-        self._substeps = _substeps(control_period)
+        self._substeps = steps_per_period(control_period, TIME_STEP)
         self.control_period = self._substeps * TIME_STEP
         self._engine: Engine = make_engine(engine, model, TIME_STEP)
         self.pattern = walking_pattern(speed, step_duration, duration, TIME_STEP)
@@ -223,7 +224,9 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
             DisturbanceError: for a malformed disturbance.
         """
         super().reset(seed=seed)
-        self._read_options(options or {})
+        disturbances = disturbances_in(options or {}, self)
+        if disturbances is not None:
+            self._disturbances = self._parse(disturbances)
         realised = self._disturbances.draw(self.np_random)
         self._k = 0
         self._tau = self._begin(realised)
@@ -269,22 +272,7 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         self._engine.close()
 
     def _parse(self, disturbances: Mapping[str, Any]) -> Disturbances:
-        return Disturbances.parse(disturbances, self._sites, self.nominal_robot.actuated)
-
-    def _read_options(self, options: Mapping[str, Any]) -> None:
-        for key in options:
-            if key not in ("disturbances", "scenario"):
-                raise OptionError("reset option", key, "'disturbances', 'scenario'")
-        if options.get("scenario") is not None:
-            from artde_gym.evaluation.scenarios import scenario  # scenarios name environments, so not at the top
-
-            entry = scenario(options["scenario"])
-            for name, value in entry.kwargs.items():
-                if getattr(self, name) != value:
-                    raise OptionError(f"{name} of this environment", getattr(self, name), f"{value!r} in {entry.name}")
-            self._disturbances = self._parse(entry.disturbances)
-        if options.get("disturbances") is not None:
-            self._disturbances = self._parse(options["disturbances"])
+        return Disturbances.parse(disturbances, self._sites, self.nominal_robot.actuated, self.robot_name)
 
     def _begin(self, realised: Mapping[str, Any]) -> Array:
         """Set an episode up and let the robot come to rest in it; returns the joint torques in the end."""
@@ -389,16 +377,6 @@ def _gravity(pitch_deg: float = 0.0, roll_deg: float = 0.0) -> tuple[float, floa
     ahead, left = math.tan(math.radians(pitch_deg)), math.tan(math.radians(roll_deg))
     size = GRAVITY / math.sqrt(1.0 + ahead * ahead + left * left)
     return (-size * ahead, -size * left, -size)
-
-
-def _substeps(control_period: float) -> int:
-    allowed = f"whole multiples of {TIME_STEP} s up to 0.05 s"
-    if not (isinstance(control_period, (int, float)) and math.isfinite(control_period)):
-        raise OptionError("control_period", control_period, allowed)
-    substeps = round(control_period / TIME_STEP)
-    if not (1 <= substeps <= 50 and math.isclose(substeps * TIME_STEP, control_period, rel_tol=1e-9)):
-        raise OptionError("control_period", control_period, allowed)
-    return substeps
 
 
 def _plan(pattern: WalkingPattern, substeps: int) -> Array:
