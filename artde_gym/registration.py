@@ -73,6 +73,11 @@ def register_all() -> None:
     """Register what this project brings; called once, by `import artde_gym`."""
     gym.register(id="BipedWalk-Payload-v0", entry_point="artde_gym.envs.biped_walk:BipedWalkPayloadEnv")
     gym.register(id="BipedPush-v0", entry_point="artde_gym.envs.biped_push:BipedPushEnv")
+    gym.register(
+        id="QuadInfinity-Payload-v0",
+        entry_point="artde_gym.envs.quadrotor:QuadInfinityPayloadEnv",
+        vector_entry_point="artde_gym.envs.quadrotor_batch:QuadInfinityPayloadVectorEnv",
+    )
     law = "controllers.policies:make_law"
     register_controller("tde", law, law="tde", text="time-delay estimation")
     register_controller("atde", law, law="atde", text="TDE + one adaptive gain")
