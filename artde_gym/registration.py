@@ -78,16 +78,19 @@ def register_all() -> None:
         entry_point="artde_gym.envs.quadrotor:QuadInfinityPayloadEnv",
         vector_entry_point="artde_gym.envs.quadrotor_batch:QuadInfinityPayloadVectorEnv",
     )
-    law = "controllers.policies:make_law"
+    law = "controllers.robots:make_for_robot"
     register_controller("tde", law, law="tde", text="time-delay estimation")
     register_controller("atde", law, law="atde", text="TDE + one adaptive gain")
     register_controller("artde", law, law="artde", text="TDE + adaptive-robust term, as printed in the thesis")
     register_controller("artde-robust", law, law="artde", preset="robust", text="ARTDE with bounded gains")
-    register_controller("pid", law, law="pid", text="PID at the gains that make it equal to TDE")
+    register_controller("pid", law, law="pid", text="PID; biped: equal to TDE, quadrotor: a tuned cascade")
     register_controller("tde+c", law, law="tde+c", text="TDE + robust term of constant gain (ablation)")
     register_controller("tde+kd", law, law="tde+kd", text="TDE at the stiffer gains equivalent to it (ablation)")
+    register_controller("asmc", law, law="asmc", text="quadrotor: adaptive sliding mode (a law of ours)")
+    register_controller("indi", law, law="indi", text="quadrotor: incremental nonlinear dynamic inversion")
+    register_controller("geometric", law, law="geometric", text="quadrotor: geometric control on SE(3), with integral")
     register_controller(
         "computed-torque",
         "controllers.model_based:make_computed_torque",
-        text="feedback linearisation with the nominal model (upper reference)",
+        text="biped: feedback linearisation with the nominal model (upper reference)",
     )

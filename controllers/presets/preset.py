@@ -1,0 +1,14 @@
+"""One entry of the tables of gains."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+
+@dataclasses.dataclass(frozen=True)
+class Preset:
+    """Gains (a frozen dataclass of `controllers.laws`) and where they come from."""
+
+    gains: Any
+    source: str
