@@ -38,8 +38,9 @@ import pandas as pd
 
 from artde_gym.errors import OptionError, UnknownNameError, among
 from artde_gym.evaluation import statistics
+from artde_gym.evaluation.environments import arguments_of
 from artde_gym.evaluation.evaluate import CUSTOM, Update, evaluate
-from artde_gym.evaluation.frontier_axis import Axis, Harder, arguments_of, axis, standard_test
+from artde_gym.evaluation.frontier_axis import Axis, Harder, axis, standard_test
 from artde_gym.evaluation.provenance import provenance
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.evaluation.store import claim, write_atomically

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-import inspect
 import math
 from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple
 
-import gymnasium as gym
-from gymnasium.envs.registration import load_env_creator
-
 from artde_gym.disturbances import KINDS
 from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.evaluation.environments import arguments_of
 from artde_gym.evaluation.scenarios import SCENARIOS
 
 Harder = Literal["larger", "smaller"]
@@ -157,15 +154,6 @@ def axis(
     chosen = Axis(kind, name, unit, **ends, harder=harder or (default.harder if default else "larger"))
     _check(chosen)
     return chosen
-
-
-def arguments_of(env_id: str) -> Mapping[str, inspect.Parameter]:
-    """Arguments of an environment by name.
-
-    Raises:
-        gymnasium.error.Error: if there is no such environment.
-    """
-    return inspect.signature(load_env_creator(str(gym.spec(env_id).entry_point))).parameters
 
 
 def standard_test(env_id: str, varied: Axis, arguments: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
