@@ -274,7 +274,8 @@ def test_indi_delays_acceleration_and_force_alike():
     qd, memory = np.zeros(3), None
     for _ in range(50):
         force = rng.normal(size=3)
-        before = Signals(np.zeros(3), qd, *rng.normal(size=(2, 3)), np.zeros(3), np.zeros(3))
+        q_ref, qd_ref, zero = *rng.normal(size=(2, 3)), np.zeros(3)
+        before = Signals(zero, qd, q_ref, qd_ref, zero, zero)
         memory = indi_start(before, period) if memory is None else memory
         qd = qd + period / 2.0 * force
         sample = before._replace(qd=qd, tau_applied=force)
