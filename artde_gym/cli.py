@@ -24,8 +24,8 @@ from artde_gym.evaluation.claims import CLAIMS, judge
 from artde_gym.evaluation.console import print_claims, print_result
 from artde_gym.evaluation.environments import ours
 from artde_gym.evaluation.evaluate import Update
-from artde_gym.evaluation.frontier_axis import DEFAULTS
 from artde_gym.evaluation.frontier_console import print_frontier
+from artde_gym.evaluation.frontier_standard import STANDARDS
 from artde_gym.evaluation.scenarios import scenario as find_scenario
 from artde_gym.registration import registered_controllers
 from controllers import GainError
@@ -38,6 +38,8 @@ REPRODUCED = {
     "quadrotor": ("Q1,Q1-calm,Q1-gale", "tde,atde,artde,tde+kd,asmc,pid,geometric,indi"),
 }
 """Scenarios and controllers by robot."""
+
+VARIED = dict.fromkeys(path for standard in STANDARDS.values() for path in standard.ranges)
 
 app = typer.Typer(
     add_completion=False,
@@ -112,7 +114,7 @@ def evaluate(
 
 @app.command()
 def frontier(
-    vary: Annotated[str, typer.Option(help=f"What to vary; with a range of its own: {', '.join(DEFAULTS)}.")],
+    vary: Annotated[str, typer.Option(help=f"What to vary; with a range of its own: {', '.join(VARIED)}.")],
     controllers: Annotated[str, typer.Option(help="Names, comma-separated; see `list`.")] = "tde,atde,artde",
     env: Annotated[str, typer.Option(help="Environment id.")] = "BipedPush-v0",
     low: Annotated[float | None, typer.Option(help="Smallest value, in the parameter's unit.")] = None,
@@ -128,6 +130,7 @@ def frontier(
     disturbances: Annotated[str | None, typer.Option(help="JSON, in place of the standard test's.")] = None,
     env_kwargs: Annotated[str | None, typer.Option(help="JSON, arguments of the environment.")] = None,
     gains: Annotated[str | None, typer.Option(help='JSON, e.g. {"artde": {"gamma_0": 200}}.')] = None,
+    backend: Annotated[str, typer.Option(help="single or batch, as for `evaluate`.")] = "single",
 ) -> None:
     """Find how much of one disturbance each controller survives; the same command continues an interrupted run."""
     kwargs = _json("--env-kwargs", env_kwargs)
@@ -151,6 +154,7 @@ def frontier(
             disturbances=_json("--disturbances", disturbances) if disturbances is not None else None,
             env_kwargs=kwargs,
             gains=_json("--gains", gains),
+            backend=backend,  # pyright: ignore[reportArgumentType]  # checked there
             on_progress=lambda value, update: display(update, f"{vary} {value:g}"),
         )
     print_frontier(found, console)

@@ -38,10 +38,21 @@ def tracking_of(env_id: str) -> Tracking:
     Raises:
         OptionError: for any other environment.
     """
-    creator: Any = load_env_creator(_entry_point(env_id, "single"))
-    if not hasattr(creator, "tracking"):
-        raise OptionError("env_id", env_id, "an environment of artde_gym")
-    return creator.tracking
+    return _class(env_id).tracking
+
+
+def robot_of(env_id: str) -> str:
+    """Name of the robot in an environment of this project.
+
+    Raises:
+        OptionError: for any other environment.
+    """
+    return _class(env_id).robot_name
+
+
+def ours() -> list[str]:
+    """Ids of this project's environments."""
+    return [spec.id for spec in gym.registry.values() if str(spec.entry_point).startswith("artde_gym.")]
 
 
 @functools.lru_cache(maxsize=KEPT)
@@ -64,9 +75,11 @@ def vector(env_id: str, arguments: str, size: int) -> Any:
     return gym.make_vec(env_id, size, vectorization_mode="vector_entry_point", **given)
 
 
-def ours() -> list[str]:
-    """Ids of this project's environments."""
-    return [spec.id for spec in gym.registry.values() if str(spec.entry_point).startswith("artde_gym.")]
+def _class(env_id: str) -> Any:
+    creator: Any = load_env_creator(_entry_point(env_id, "single"))
+    if not hasattr(creator, "tracking"):
+        raise OptionError("env_id", env_id, "an environment of artde_gym")
+    return creator
 
 
 def _checked(env_id: str, arguments: str, backend: Backend) -> dict[str, Any]:
