@@ -85,6 +85,7 @@ TRACKING = Tracking(
     near=0.0,
     tde_errors={"tde_error_rms": "sigma"},
     means={"robust_gain_mean": "c"},
+    told=("foot_loads",),
     speed=lambda fields: fields["base_velocity"][..., 0],
 )
 

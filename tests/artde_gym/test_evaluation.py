@@ -221,6 +221,8 @@ def test_folder_holds_what_the_documentation_says(tmp_path: Path) -> None:
     assert traces["time"] == pytest.approx(0.008 * np.arange(51))  # 125 Hz is the nearest whole stride of 4 ms
     assert traces["q"].shape == (51, 12)
     assert {"policy.sigma", "policy.s", "policy.beta_0", "policy.beta_1"} <= set(traces)
+    assert traces["foot_loads"].shape == (51, 2)
+    assert traces["foot_loads"].sum(axis=1).mean() == pytest.approx(9.81 * (8.986 + 1.3), rel=0.05)  # it stands
 
 
 def test_traces_at_full_rate_on_request(tmp_path: Path) -> None:
