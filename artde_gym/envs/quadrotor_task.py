@@ -82,8 +82,8 @@ def _heading_error(fields: Fields) -> Array:
 
 def _induced_power(fields: Fields) -> Array:
     """Sum of T^1.5 / sqrt(2 rho A), what ideal rotors need to hover (W)."""
-    disc = math.pi * robot.ROTOR_RADIUS**2
-    return (np.maximum(fields["rotor_thrust"], 0.0) ** 1.5).sum(axis=-1) / math.sqrt(2.0 * AIR_DENSITY * disc)
+    disc, thrust = math.pi * robot.ROTOR_RADIUS**2, np.maximum(fields["rotor_thrust"], 0.0)
+    return (thrust * np.sqrt(thrust)).sum(axis=-1) / math.sqrt(2.0 * AIR_DENSITY * disc)
 
 
 TRACKING = Tracking(
