@@ -64,7 +64,10 @@ def main() -> None:
 def evaluate(
     controllers: Annotated[str, typer.Option(help="Names, comma-separated; see `list`.")] = "tde,atde,artde",
     scenario: Annotated[
-        str | None, typer.Option(help="Names, comma-separated; see `list`. Default: the main ones of the environment.")
+        str | None,
+        typer.Option(
+            help="Names, comma-separated; see `list`. Default: the environment's main ones, or its first in batches."
+        ),
     ] = None,
     env: Annotated[str | None, typer.Option(help=f"Environment id. Default: the scenarios', or {WALK}.")] = None,
     episodes: Annotated[int, typer.Option(help="Seeded episodes of each controller in each scenario.")] = 3,
@@ -87,6 +90,8 @@ def evaluate(
     if scenario is None:
         env = env or WALK
         scenario = MAIN_SCENARIOS.get(env)
+        if scenario is not None and backend == "batch":
+            scenario = scenario.split(",")[0]
     kwargs = _json("--env-kwargs", env_kwargs)
     if engine is not None:
         kwargs["engine"] = engine
