@@ -10,24 +10,26 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import gymnasium as gym
+import pandas as pd
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from artde_gym import __version__
-from artde_gym.errors import ArtdeGymError, OptionError, among
+from artde_gym.errors import ArtdeGymError, OptionError
 from artde_gym.evaluation import SCENARIOS
 from artde_gym.evaluation import evaluate as run_evaluation
 from artde_gym.evaluation import frontier as run_frontier
+from artde_gym.evaluation import reproduce as run_reproduction
 from artde_gym.evaluation import tune as run_tuning
-from artde_gym.evaluation.claims import CLAIMS, judge
+from artde_gym.evaluation.claims import confirm
 from artde_gym.evaluation.console import print_claims, print_result
 from artde_gym.evaluation.environments import ours, robot_of
 from artde_gym.evaluation.evaluate import Update
 from artde_gym.evaluation.frontier_console import print_frontier
 from artde_gym.evaluation.frontier_standard import STANDARDS
-from artde_gym.evaluation.scenarios import scenario as find_scenario
+from artde_gym.evaluation.reproduce import ROBOTS, scenarios_of
 from artde_gym.evaluation.tune_console import print_tuning
 from artde_gym.registration import registered_controllers
 from controllers import GainError
@@ -35,12 +37,7 @@ from controllers import GainError
 WALK = "BipedWalk-Payload-v0"
 MAIN_SCENARIOS = {WALK: "S1,S2,S1-L4,S2-L4", "QuadInfinity-Payload-v0": "Q1,Q1-calm,Q1-gale"}
 """What is run in an environment where no scenario is named."""
-REPRODUCED = {
-    "biped": ("S1,S2,S3,S1-L4,S2-L4,S3-L4,S1-GRF", "tde,atde,artde,tde+kd"),
-    "quadrotor": ("Q1,Q1-calm,Q1-gale", "tde,atde,artde,tde+kd,asmc,pid,geometric,indi"),
-}
-"""Scenarios and controllers by robot."""
-
+ENGINES = ("bullet", "mujoco")
 VARIED = dict.fromkeys(path for standard in STANDARDS.values() for path in standard.ranges)
 
 app = typer.Typer(
@@ -215,42 +212,51 @@ def tune(
 
 @app.command()
 def reproduce(
-    robot: Annotated[str, typer.Option(help=f"{', '.join(REPRODUCED)}, or all.")] = "all",
+    robot: Annotated[str, typer.Option(help=f"{', '.join(ROBOTS)}, or all.")] = "all",
+    engine: Annotated[str, typer.Option(help=f"Physics engine: {', '.join(ENGINES)}, or both.")] = "bullet",
     episodes: Annotated[int, typer.Option(help="Seeded episodes of each controller in each scenario.")] = 10,
     scenario: Annotated[str | None, typer.Option(help="Names, comma-separated. Default: all of the robot.")] = None,
     controllers: Annotated[str | None, typer.Option(help="Names, comma-separated. Default: the robot's own.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the whole run.")] = 0,
     workers: Annotated[int | None, typer.Option(help="Processes. Default: all cores.")] = None,
     out: Annotated[
-        Path, typer.Option(help="Results folder, with one for each robot; the same call continues an interrupted one.")
+        Path, typer.Option(help="Results folder, one inside for each engine and robot; the same call continues it.")
     ] = Path("runs/reproduce"),
 ) -> None:
-    """Run the thesis' scenarios and print each of its claims with a verdict, then its tables beside ours."""
-    if robot not in (*REPRODUCED, "all"):
-        raise OptionError("--robot", robot, among(robot, (*REPRODUCED, "all")))
+    """Run the thesis' scenarios and print its tables beside ours, then each of its claims with a verdict."""
+    robots = list(ROBOTS) if robot == "all" else [robot]
+    engines = list(ENGINES) if engine == "both" else [engine]
+    named = None if scenario is None else _names(scenario)
     console = Console()
-    for name in REPRODUCED if robot == "all" else [robot]:
-        own_scenarios, own_controllers = REPRODUCED[name]
-        environments = {find_scenario(own).env_id for own in _names(own_scenarios)}
-        chosen = [one for one in _names(scenario or own_scenarios) if find_scenario(one).env_id in environments]
+    for name in robots:
+        chosen = scenarios_of(name, named)
         if not chosen:
             continue
-        with Display(console) as display:
-            result = run_evaluation(
-                _names(controllers or own_controllers),
-                scenario=chosen,
-                episodes=episodes,
-                seed=seed,
-                workers=workers or os.cpu_count() or 1,
-                out=out / name,
-                on_progress=display,
-            )
-        print_result(result, console)
-        verdicts = judge(result, [claim for claim in CLAIMS if claim.scenario in result.scenarios])
-        verdicts.to_csv(out / name / "claims.csv", index=False)
-        print_claims(verdicts, console)
-        if not result.complete:
-            raise typer.Exit(130)
+        verdicts: dict[str, pd.DataFrame] = {}
+        for one in engines:
+            with Display(console) as display:
+                found = run_reproduction(
+                    name,
+                    out / one / name,
+                    scenarios=chosen,
+                    controllers=None if controllers is None else _names(controllers),
+                    episodes=episodes,
+                    seed=seed,
+                    workers=workers or os.cpu_count() or 1,
+                    engine=one,
+                    on_progress=lambda what, update, display=display: display(update, what),
+                )
+            if len(engines) > 1:
+                console.rule(f"{name} in {one}")
+            print_result(found.result, console)
+            print_claims(found.claims, console)
+            verdicts[one] = found.claims
+            if not found.result.complete:
+                raise typer.Exit(130)
+        if len(engines) > 1:
+            both = confirm(verdicts)
+            both.to_csv(out / f"claims-{name}.csv", index=False)
+            print_claims(both, console)
 
 
 @app.command("list")

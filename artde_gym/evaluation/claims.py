@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
@@ -267,6 +267,18 @@ def judge(result: Result, claims: Sequence[Claim] = CLAIMS) -> pd.DataFrame:
         verdict = claim.judge(result)
         rows.append((claim.scenario, claim.text, verdict.outcome, verdict.measured, claim.thesis))
     return pd.DataFrame(rows, columns=["scenario", "claim", "verdict", "measured", "thesis"])
+
+
+def confirm(verdicts: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Verdicts of several engines side by side: scenario, claim, one column an engine, confirmed.
+
+    A verdict is *confirmed* where every engine comes to it and it is a decision; else `confirmed` is empty.
+    """
+    keys = ["scenario", "claim"]
+    joined = pd.DataFrame({engine: table.set_index(keys)["verdict"] for engine, table in verdicts.items()})
+    first = joined.iloc[:, 0]
+    agreed = joined.nunique(axis=1).eq(1) & first.isin(["holds", "does not hold"])
+    return joined.assign(confirmed=first.where(agreed, "")).reset_index()
 
 
 def _upright(result: Result, scenario: str, controller: str) -> pd.DataFrame:

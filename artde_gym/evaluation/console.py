@@ -28,6 +28,7 @@ ALL = "all"  # axes together
 TOGETHER = 3  # columns of controllers, or of comparisons, that fit a terminal
 ACROSS = 4  # columns of axes that do
 WIDE = 6  # columns of controllers that do with a space on either side
+_VERDICTS = {"holds": "green", "does not hold": "red", "undecided": "yellow", "not measured": "dim"}
 
 
 def print_result(result: Result, console: Console) -> None:
@@ -46,11 +47,10 @@ def print_result(result: Result, console: Console) -> None:
 
 
 def print_claims(verdicts: pd.DataFrame, console: Console) -> None:
-    """Print the table of `artde_gym.evaluation.claims.judge`."""
-    styles = {"holds": "green", "does not hold": "red", "undecided": "yellow", "not measured": "dim"}
-    table = _table("scenario", "claim", "verdict", "measured", "thesis", title="Claims")
-    for scenario, claim, verdict, measured, printed in verdicts.itertuples(index=False, name=None):
-        table.add_row(scenario, claim, Text(verdict, style=styles[verdict]), measured, printed)
+    """Print the table of `artde_gym.evaluation.claims.judge`, or of `confirm`."""
+    table = _table(*verdicts.columns, title="Claims")
+    for row in verdicts.itertuples(index=False, name=None):
+        table.add_row(*(Text(word, style=_VERDICTS.get(word, "")) for word in row))
         table.add_section()
     console.print()
     console.print(table)

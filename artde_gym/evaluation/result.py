@@ -33,11 +33,15 @@ class Result:
 
     @property
     def controllers(self) -> list[str]:
-        return list(dict.fromkeys(self.episodes["controller"].tolist()))
+        return self._different("controller")
 
     @property
     def scenarios(self) -> list[str]:
-        return list(dict.fromkeys(self.episodes["scenario"].tolist()))
+        return self._different("scenario")
+
+    def _different(self, column: str) -> list[str]:
+        """Values of a column in the order in which they come; an empty result has no columns."""
+        return [] if self.episodes.empty else list(dict.fromkeys(self.episodes[column].tolist()))
 
     @property
     def metrics(self) -> list[str]:

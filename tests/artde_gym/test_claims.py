@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 from artde_gym.evaluation import SCENARIOS, Result, statistics, thesis
-from artde_gym.evaluation.claims import CLAIMS, adapts, falls, improves, judge, ordered, repeats
+from artde_gym.evaluation.claims import CLAIMS, adapts, confirm, falls, improves, judge, ordered, repeats
 from artde_gym.evaluation.console import print_claims
 
 
@@ -180,3 +180,17 @@ def test_every_claim_belongs_to_a_scenario_and_prints() -> None:
     text = console.export_text()
     assert "does not hold" in text
     assert "not measured" in text
+
+
+def test_confirmed_is_what_every_engine_decides_alike() -> None:
+    verdicts = {
+        "bullet": ["holds", "holds", "undecided", "does not hold"],
+        "mujoco": ["holds", "does not hold", "undecided", "does not hold"],
+    }
+    tables = {
+        engine: pd.DataFrame({"scenario": "S1", "claim": list("abcd"), "verdict": words, "measured": "", "thesis": ""})
+        for engine, words in verdicts.items()
+    }
+    both = confirm(tables)
+    assert both.columns.tolist() == ["scenario", "claim", "bullet", "mujoco", "confirmed"]
+    assert both["confirmed"].tolist() == ["holds", "", "", "does not hold"]

@@ -22,7 +22,7 @@ import artde_gym
 from artde_gym.cli import app
 from artde_gym.envs import quadrotor_task
 from artde_gym.errors import ArtdeGymError, DisturbanceError, OptionError, StoreError, UnknownNameError
-from artde_gym.evaluation import SCENARIOS, Result, evaluate, statistics, thesis
+from artde_gym.evaluation import SCENARIOS, Result, evaluate, reproduce, statistics, thesis
 from artde_gym.evaluation.console import print_result
 from artde_gym.evaluation.evaluate import Update, episode_seed
 from controllers import GainError
@@ -320,18 +320,41 @@ def test_command_prints_ours_beside_the_thesis(tmp_path: Path) -> None:
         assert word in listing
 
 
-def test_reproduce_runs_both_robots(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_reproduce_runs_both_robots_in_both_engines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("S1", "Q1"):
         monkeypatch.setitem(SCENARIOS, name, dataclasses.replace(SCENARIOS[name], kwargs={"duration": 0.2}))
     arguments = ["reproduce", "--scenario", "S1,Q1", "--episodes", "1", "--workers", "1", "--out", str(tmp_path)]
-    outcome = CliRunner().invoke(app, arguments)
+    outcome = CliRunner().invoke(app, [*arguments, "--engine", "both"])
     assert outcome.exit_code == 0, outcome.output
-    for word in ("S1: walk", "Table 2.1", "Q1: infinity", "Table 3.1", "nobody crashes", "geometric"):
+    for word in ("S1: walk", "Table 2.1", "Q1: infinity", "Table 3.1", "nobody crashes", "geometric", "confirmed"):
         assert word in outcome.output
-    assert set(pd.read_csv(tmp_path / "biped" / "claims.csv")["scenario"]) == {"S1"}
-    assert set(pd.read_csv(tmp_path / "quadrotor" / "claims.csv")["scenario"]) == {"Q1"}
+    for engine in ("bullet", "mujoco"):
+        assert set(pd.read_csv(tmp_path / engine / "biped" / "claims.csv")["scenario"]) == {"S1"}
+        assert set(pd.read_csv(tmp_path / engine / "quadrotor" / "claims.csv")["scenario"]) == {"Q1"}
     assert CliRunner().invoke(app, [*arguments, "--robot", "biped"]).output.count("Table 3.1") == 0
     assert run_command("reproduce", "--robot", "bipedal").returncode == 2
+
+
+def test_the_ablation_is_as_stiff_as_artde_was_in_the_same_scenario(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("S1", "S2"):
+        monkeypatch.setitem(SCENARIOS, name, dataclasses.replace(SCENARIOS[name], kwargs=SHORT))
+    found = reproduce("biped", tmp_path, scenarios=["S1", "S2"], episodes=2)
+    gains = {}
+    for name in ("S1", "S2"):
+        mean = found.result.values(name, "artde", "robust_gain_mean").mean()
+        record = json.loads((tmp_path / "ablation" / name / "summary.json").read_text())
+        gains[name] = record["configuration"]["gains"]["tde+kd"]["c"]
+        assert gains[name] == mean
+        again = evaluate(["tde+kd"], scenario=name, episodes=2, gains={"tde+kd": {"c": mean}})
+        assert again.values(name, "tde+kd", "rmse_deg").tobytes() == (
+            found.result.values(name, "tde+kd", "rmse_deg").tobytes()
+        )
+    assert gains["S1"] != gains["S2"]
+    with pytest.raises(OptionError, match="beside"):
+        reproduce("biped", tmp_path / "other", scenarios=["S1"], controllers=["tde", "tde+kd"])
+    assert not (tmp_path / "other").exists()
 
 
 def test_a_recovery_that_never_came_is_counted() -> None:
