@@ -7,8 +7,8 @@
 Source: Dantu 2023, equations 2.19 to 2.21, in discrete time: du_k uses the gains of sample k, whose change acts from
 sample k + 1 on. Two properties of the law as printed are worth knowing: s_k^T (s_k - s_k-1) is biased upward by
 |s_k - s_k-1|^2 / 2, and since one gain at its floor lets *all* of them grow, b_1 dithers at its floor while b_0
-ratchets up. So the gains drift without bound. The options of `ArtdeGains` mend each point; the defaults are the law as
-printed.
+ratchets up. Nothing in the law bounds the gains; where they settle, or whether, is up to the plant and its noise. The
+options of `ArtdeGains` mend each point; the defaults are the law as printed.
 """
 
 from __future__ import annotations
