@@ -19,15 +19,15 @@ class Field:
 
     Attributes:
         unit: in SI, "1" for a pure number.
-        low, high: the same bound for each component, finite and physical.
+        low, high: finite, physical bounds: one for each component, or one number for all.
         text: what it is, frame included.
     """
 
     name: str
     size: int
     unit: str
-    low: float
-    high: float
+    low: float | tuple[float, ...]
+    high: float | tuple[float, ...]
     text: str
 
 
@@ -56,11 +56,13 @@ class Layout:
         """Views of all fields of `vector` (..., size) by name."""
         return {name: vector[..., part] for name, part in self.slices.items()}
 
-    def box(self) -> Box:
+    def box(self, dtype: type[np.floating[Any]] | np.dtype[Any] = np.float64) -> Box:
         """The space with the fields' bounds."""
-        low = np.concatenate([np.full(field.size, field.low) for field in self.fields])
-        high = np.concatenate([np.full(field.size, field.high) for field in self.fields])
-        return Box(low, high, dtype=np.float64)
+        low, high = (
+            np.concatenate([np.full(field.size, getattr(field, bound), dtype) for field in self.fields])
+            for bound in ("low", "high")
+        )
+        return Box(low, high, dtype=dtype)
 
     def table(self) -> str:
         """The fields as a Markdown table."""
@@ -68,5 +70,10 @@ class Layout:
         for field in self.fields:
             part = self.slices[field.name]
             index = f"{part.start}" if field.size == 1 else f"{part.start}..{part.stop - 1}"
-            rows.append(f"| {index} | `{field.name}` | {field.unit} | {field.low:g} | {field.high:g} | {field.text} |")
+            low, high = _bound(field.low), _bound(field.high)
+            rows.append(f"| {index} | `{field.name}` | {field.unit} | {low} | {high} | {field.text} |")
         return "\n".join(rows)
+
+
+def _bound(values: float | tuple[float, ...]) -> str:
+    return ", ".join(f"{value:g}" for value in (values if isinstance(values, tuple) else (values,)))

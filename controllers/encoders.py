@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from controllers.laws.errors import GainError
-from controllers.laws.tracking import Array, Signals
+from controllers.laws.tracking import Array, Memory, Signals
 from controllers.laws.velocity_estimate import EstimateMemory, estimate, estimate_start
-from controllers.policies import Memory, Plant, TrackingPolicy
+from controllers.policies import Plant, TrackingPolicy
 
 
 class EncoderMemory(NamedTuple):

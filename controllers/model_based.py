@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
+from artde_gym.registration import GainRange
 from artde_gym.robots.support import Supported
+from controllers.law_table import Nothing
 from controllers.laws.computed_torque import ComputedTorqueGains, computed_torque
-from controllers.laws.tracking import Array, Signals
-from controllers.policies import Memory, Plant, TrackingPolicy
-from controllers.presets import preset_gains
+from controllers.laws.tracking import Array, Memory, Signals
+from controllers.policies import Plant, TrackingPolicy
+from controllers.presets import gain_ranges, preset_gains
 
 
 class ComputedTorquePolicy(TrackingPolicy):
@@ -23,7 +25,7 @@ class ComputedTorquePolicy(TrackingPolicy):
         self._load = plant.observation["load_left_ref"].start
 
     def start(self, signals: Signals) -> Memory:
-        return _Nothing()
+        return Nothing()
 
     def step(self, memory: Any, signals: Signals, observation: Array) -> tuple[Array, Memory]:
         load_left = observation[..., self._load]
@@ -34,11 +36,7 @@ class ComputedTorquePolicy(TrackingPolicy):
         return computed_torque(self.gains, signals, inverse_dynamics), memory
 
 
-class _Nothing(NamedTuple):
-    """The memory of a law without one."""
-
-
-def make_computed_torque(env: Any, *, preset: str = "thesis", **gains: Any) -> ComputedTorquePolicy:
+def make_computed_torque(env: Any, *, preset: str | None = None, **gains: Any) -> ComputedTorquePolicy:
     """The policy for a biped environment, at preset gains with some replaced.
 
     Raises:
@@ -46,3 +44,8 @@ def make_computed_torque(env: Any, *, preset: str = "thesis", **gains: Any) -> C
     """
     plant = Plant.of(env)
     return ComputedTorquePolicy(plant, preset_gains(plant.robot, "computed-torque", preset, plant.action.size, gains))
+
+
+def search_space(env: Any) -> dict[str, GainRange]:
+    """Where tuning may look for the gains."""
+    return gain_ranges(Plant.of(env).robot, "computed-torque", None)

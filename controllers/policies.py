@@ -7,7 +7,6 @@ arrays with the observations' leading axes, so that one policy object serves any
 from __future__ import annotations
 
 import abc
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,14 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from artde_gym.errors import OptionError
 from artde_gym.layout import Layout
-from controllers.laws.artde import artde, artde_start
-from controllers.laws.atde import atde, atde_start
-from controllers.laws.pid import PidGains, identity_gains, pid, pid_start
-from controllers.laws.tde import ConstantGains, TdeGains, constant_gain_tde, equivalent_gains, tde, tde_start
-from controllers.laws.tracking import Array, Signals
+from controllers.law_table import LAWS
+from controllers.laws.tracking import Array, Memory, Signals
 from controllers.presets import preset_gains
-
-Memory = tuple[Any, ...]
 
 
 class Plant(NamedTuple):
@@ -45,8 +39,8 @@ class Plant(NamedTuple):
         return cls(*(read(name) for name in names))
 
 
-class TrackingPolicy(abc.ABC):
-    """A tracking law on the environment's observations; subclasses say what happens in one sample.
+class Policy(abc.ABC):
+    """A law on the environment's observations; subclasses say what it reads and what happens in one sample.
 
     Args:
         name: under which results are listed.
@@ -58,16 +52,19 @@ class TrackingPolicy(abc.ABC):
         self.name = name
         self.gains = gains
         self._size = plant.observation.size
-        self._parts = [(..., plant.observation[field]) for field in Signals._fields]
         box = plant.action.box()
         self._low, self._high = box.low, box.high
 
     @abc.abstractmethod
-    def start(self, signals: Signals) -> Memory:
+    def read(self, observation: Array) -> Any:
+        """The signals of one sample in an observation (..., n_obs)."""
+
+    @abc.abstractmethod
+    def start(self, signals: Any) -> Memory:
         """Memory before the first sample."""
 
     @abc.abstractmethod
-    def step(self, memory: Any, signals: Signals, observation: Array) -> tuple[Array, Memory]:
+    def step(self, memory: Any, signals: Any, observation: Array) -> tuple[Array, Memory]:
         """One sample: force (..., n) before saturation, and the memory for the next one."""
 
     def predict(
@@ -92,7 +89,7 @@ class TrackingPolicy(abc.ABC):
         given = np.asarray(observation)
         if given.shape[-1:] != (self._size,):
             raise OptionError("shape of the observation", given.shape, f"(..., {self._size})")
-        signals = Signals(*[given[part] for part in self._parts])
+        signals = self.read(given)
         if state is None:
             state = self.start(signals)
         elif episode_start is not None:
@@ -105,16 +102,26 @@ class TrackingPolicy(abc.ABC):
 
     def diagnostics(self, state: Memory) -> dict[str, Array]:
         """What the memory tells of the law's inside, by name: sigma, s, beta, c, ..., as far as it has them."""
-        return _flatten(state)
+        return flatten(state)
+
+
+class TrackingPolicy(Policy):
+    """A law on the joints' `Signals`, each a field of the observation."""
+
+    def __init__(self, name: str, plant: Plant, gains: Any) -> None:
+        super().__init__(name, plant, gains)
+        self._parts = [(..., plant.observation[field]) for field in Signals._fields]
+
+    def read(self, observation: Array) -> Signals:
+        return Signals(*[observation[part] for part in self._parts])
 
 
 class LawPolicy(TrackingPolicy):
     """One of the laws that need nothing but the signals and the sampling period."""
 
     def __init__(self, name: str, plant: Plant, gains: Any) -> None:
-        law = _LAWS[name]
-        super().__init__(name, plant, law.convert(gains, plant.control_period))
-        self._law = law
+        self._law, convert = LAWS[name]
+        super().__init__(name, plant, convert(gains, plant.control_period))
         self._period = plant.control_period
 
     def start(self, signals: Signals) -> Memory:
@@ -124,53 +131,21 @@ class LawPolicy(TrackingPolicy):
         return self._law.step(self.gains, memory, signals, self._period)
 
 
-class _Law(NamedTuple):
-    start: Callable[[Any, Signals, float], Memory]
-    step: Callable[[Any, Any, Signals, float], tuple[Array, Memory]]
-    convert: Callable[[Any, float], Any]  # preset gains and period -> the law's own gains
-
-
-def _tde_start(_gains: TdeGains, signals: Signals, period: float) -> Memory:
-    return tde_start(signals, period)
-
-
-def _pid_start(_gains: PidGains, signals: Signals, period: float) -> Memory:
-    return pid_start(signals, period)
-
-
-def _same(gains: Any, _period: float) -> Any:
-    return gains
-
-
-def _equivalent(gains: ConstantGains, _period: float) -> TdeGains:
-    return equivalent_gains(gains)
-
-
-_LAWS = {
-    "tde": _Law(_tde_start, tde, _same),
-    "atde": _Law(atde_start, atde, _same),
-    "artde": _Law(artde_start, artde, _same),
-    "pid": _Law(_pid_start, pid, identity_gains),
-    "tde+c": _Law(_tde_start, constant_gain_tde, _same),
-    "tde+kd": _Law(_tde_start, tde, _equivalent),
-}
-
-
 def make_law(
-    env: Any, *, law: str, preset: str = "thesis", velocity_cutoff_hz: float | None = None, **gains: Any
+    env: Any, *, law: str, preset: str | None = None, velocity_cutoff_hz: float | None = None, **gains: Any
 ) -> TrackingPolicy:
     """The policy of a law for an environment, at preset gains with some replaced.
 
     Args:
         env: the environment that it will drive.
         law: name of the law.
-        preset: name of its gains.
+        preset: name of its gains; None for the law's default.
         velocity_cutoff_hz: with a number, velocities are estimated from the observed angles by a low-pass of this
             bandwidth, as behind encoders; without, the observed velocities are used.
         gains: in place of the preset's.
 
     Raises:
-        UnknownNameError: for an unknown preset.
+        UnknownNameError: for a law that the robot does not have, or an unknown preset.
         GainError: for an unknown gain or a value that is not allowed.
     """
     plant = Plant.of(env)
@@ -182,18 +157,19 @@ def make_law(
     return EncoderPolicy(policy, plant, velocity_cutoff_hz)
 
 
-def _choose(mask: NDArray[np.bool_], fresh: Any, kept: Any) -> Any:
-    """Nested named tuples of arrays: `fresh` where the mask is true, `kept` elsewhere; the mask covers leading axes."""
-    names: tuple[str, ...] | None = getattr(kept, "_fields", None)
-    if names is None:
-        new, old = np.asarray(fresh), np.asarray(kept)
-        return np.where(mask.reshape(mask.shape + (1,) * (old.ndim - mask.ndim)), new, old)
-    merged: Any = fresh._replace(**{name: _choose(mask, getattr(fresh, name), getattr(kept, name)) for name in names})
-    return merged
+def _choose(mask: NDArray[np.bool_], fresh: Array | Memory, kept: Array | Memory) -> Any:
+    """Nested tuples of arrays: `fresh` where the mask is true, `kept` elsewhere; the mask covers leading axes."""
+    if isinstance(fresh, tuple):
+        merged = [_choose(mask, *pair) for pair in zip(fresh, kept, strict=True)]
+        kind: Any = type(fresh)
+        return kind(*merged) if hasattr(kind, "_fields") else kind(merged)
+    new, old = np.asarray(fresh), np.asarray(kept)
+    return np.where(mask.reshape(mask.shape + (1,) * (old.ndim - mask.ndim)), new, old)
 
 
-def _flatten(memory: Any) -> dict[str, Array]:
+def flatten(memory: Any) -> dict[str, Array]:
+    """All arrays in nested named tuples by their names."""
     named: dict[str, Array] = {}
     for name, value in memory._asdict().items():
-        named.update(_flatten(value) if isinstance(value, tuple) else {name: value})
+        named.update(flatten(value) if isinstance(value, tuple) else {name: value})
     return named

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from artde_gym.arrays import Array
+from artde_gym.robots.lag import follow, lag_shares
 
 
 class Actuation:
@@ -26,9 +26,7 @@ class Actuation:
     def __init__(self, realised: Mapping[str, Any], joints: Sequence[str], time_step: float) -> None:
         self._delay: int = realised.get("torque_delay", {}).get("samples", 0)
         constant: float = realised.get("motor_lag", {}).get("time_constant", 0.0)
-        # the share of the gap that is closed at the end of a physics step, and on average over it
-        self._closed = -math.expm1(-time_step / constant) if constant > 0 else 1.0
-        self._closed_mean = 1.0 - self._closed * constant / time_step if constant > 0 else 1.0
+        self._closed, self._closed_mean = lag_shares(constant, time_step)
         self._losses = [
             (joints.index(loss["joint"]), loss["factor"], round(loss["start"] / time_step))
             for loss in realised.get("actuator_loss", ())
@@ -55,7 +53,5 @@ class Actuation:
                     target[joint] *= factor
         if self._closed == 1.0:
             return target
-        gap = target - self._acting
-        mean = self._acting + self._closed_mean * gap
-        self._acting = self._acting + self._closed * gap
+        self._acting, mean = follow(self._acting, target, self._closed, self._closed_mean)
         return mean

@@ -37,25 +37,38 @@ class Disturbances:
 
     @classmethod
     def parse(
-        cls, given: Mapping[str, Any] | None, sites: Collection[str], joints: Collection[str] = ()
+        cls,
+        given: Mapping[str, Any] | None,
+        sites: Collection[str],
+        joints: Collection[str] = (),
+        robot: str | None = None,
     ) -> Disturbances:
-        """Check `given` against the grammar, for a robot that has these sites to be pushed at and these joints.
+        """Check `given` against the grammar.
+
+        Args:
+            given: as a user wrote it.
+            sites: of the robot, to be pushed at.
+            joints: of the robot, or its rotors.
+            robot: one of `artde_gym.disturbances.kinds.ROBOTS`, for its kinds and defaults; without, any kind is read.
 
         Raises:
-            DisturbanceError: for an unknown kind, key or site, a wrong type, a value out of range or not finite.
+            DisturbanceError: for an unknown kind, key or site, a kind that the robot does not honour, a wrong type, a
+                value out of range or not finite.
         """
         if given is None:
             return cls()
         if not isinstance(given, Mapping):
             raise DisturbanceError("disturbances", given, "a mapping of kinds to their parameters")
+        honoured = [kind.name for kind in KINDS.values() if robot is None or robot in kind.robots]
         for name in given:
-            if name not in KINDS:
-                raise DisturbanceError("disturbances", name, among(name, KINDS))
+            if name not in honoured:
+                of_robot = f"{robot} honours " if name in KINDS else ""
+                raise DisturbanceError("disturbances", name, of_robot + among(name, honoured))
         entries: list[tuple[str, Mapping[str, Any]]] = []
         for name, kind in KINDS.items():
             if name in given:
                 for path, entry in _entries(kind, given[name]):
-                    parsed = _parse_entry(kind, entry, path, {"site": sites, "joint": (*joints, ALL)})
+                    parsed = _parse_entry(kind, entry, path, {"site": sites, "joint": (*joints, ALL)}, robot)
                     entries += [(name, one) for one in _each_joint(parsed, joints)]
         return cls(tuple(entries))
 
@@ -98,7 +111,9 @@ def _each_joint(entry: dict[str, Any], joints: Collection[str]) -> list[dict[str
     return [{**entry, "joint": joint} for joint in joints] if entry.get("joint") == ALL else [entry]
 
 
-def _parse_entry(kind: Kind, given: Any, path: str, words: Mapping[str, Collection[str]]) -> dict[str, Any]:
+def _parse_entry(
+    kind: Kind, given: Any, path: str, words: Mapping[str, Collection[str]], robot: str | None
+) -> dict[str, Any]:
     names = {parameter.name: parameter for parameter in kind.parameters}
     if kind.scalar is not None and (_is_number(given) or _is_distribution(given)):
         given = {kind.scalar: given}
@@ -112,7 +127,7 @@ def _parse_entry(kind: Kind, given: Any, path: str, words: Mapping[str, Collecti
         field = f"{path}.{name}"
         if name not in given and parameter.default is None:
             raise DisturbanceError(field, None, f"{allowed(parameter)} (it has no default)")
-        value = given.get(name, parameter.default)
+        value = given.get(name, parameter.default_of(robot))
         entry[name] = _word(value, parameter, field, words) if parameter.size == 0 else _check(value, parameter, field)
     return entry
 

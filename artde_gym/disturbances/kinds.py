@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+ROBOTS = ("ojas", "q450")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -12,10 +16,11 @@ class Parameter:
     Attributes:
         low, high: allowed range of each component.
         default: used where the parameter is left out; None if it must be given.
+        other_defaults: defaults of robots that need another one, by robot.
         size: number of components; 0 for a word.
         nonzero: whether a vector of zeros is refused.
         integer: whether the value is a whole number.
-        words: allowed words, or "site" or "joint" for the names that the robot has.
+        words: allowed words, or "site" or "joint" for the names that the robot has; rotors count as joints.
     """
 
     name: str
@@ -28,11 +33,16 @@ class Parameter:
     nonzero: bool = False
     integer: bool = False
     words: tuple[str, ...] | str = ()
+    other_defaults: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+
+    def default_of(self, robot: str | None) -> Any:
+        """The default for a robot, or for none in particular."""
+        return self.other_defaults.get(str(robot), self.default)
 
 
 @dataclasses.dataclass(frozen=True)
 class Kind:
-    """A disturbance by name. `scalar` names the parameter that a bare number stands for.
+    """A disturbance by name, for the `robots` that honour it. `scalar` is the parameter that a bare number stands for.
 
     A `repeated` kind takes a list of entries. Where it names a joint, "all" stands for one entry a joint.
     """
@@ -42,6 +52,7 @@ class Kind:
     parameters: tuple[Parameter, ...]
     scalar: str | None = None
     repeated: bool = False
+    robots: tuple[str, ...] = ROBOTS
 
 
 ALL = "all"
@@ -49,8 +60,8 @@ NEVER = 1e9  # s
 SHAPES = ("half_sine", "double_hump")
 
 
-def _word(name: str, words: tuple[str, ...] | str, default: str | None, text: str) -> Parameter:
-    return Parameter(name, "", 0, 0, default, text, size=0, words=words)
+def _word(name: str, words: tuple[str, ...] | str, default: str | None, text: str, **other_defaults: str) -> Parameter:
+    return Parameter(name, "", 0, 0, default, text, size=0, words=words, other_defaults=other_defaults)
 
 
 def _time(name: str, default: float | None, text: str) -> Parameter:
@@ -65,7 +76,16 @@ KINDS: dict[str, Kind] = {
             "A ball fixed to the base.",
             (
                 Parameter("mass", "kg", 1e-3, 5.0, None, "mass of the ball"),
-                Parameter("position", "m", -0.5, 0.5, (0.0, 0.0, 0.16), "its centre in the base frame", size=3),
+                Parameter(
+                    "position",
+                    "m",
+                    -0.5,
+                    0.5,
+                    (0.0, 0.0, 0.16),
+                    "its centre in the base frame",
+                    size=3,
+                    other_defaults={"q450": (0.01, 0.0, -0.1)},
+                ),
                 _time("attach", 0.0, "from when; at 0 the episode starts in balance with it"),
                 _time("drop", NEVER, "until when; not after `attach`, it never appears"),
             ),
@@ -75,7 +95,7 @@ KINDS: dict[str, Kind] = {
             "push",
             "A constant force for a while, in world axes.",
             (
-                _word("body", "site", "torso", "named site of the robot at which it acts"),
+                _word("body", "site", "torso", "named site of the robot at which it acts", q450="body"),
                 Parameter("magnitude", "N", 0.0, 500.0, None, "size of the force"),
                 Parameter(
                     "direction",
@@ -104,12 +124,14 @@ KINDS: dict[str, Kind] = {
                 Parameter("q", "1", -1.0, 1.0, 0.4, "depth between the humps"),
             ),
             scalar="magnitude",
+            robots=("ojas",),
         ),
         Kind(
             "friction",
             "Friction coefficient of the pair foot and ground.",
             (Parameter("coefficient", "1", 0.01, 2.0, None, "instead of the nominal 0.8"),),
             scalar="coefficient",
+            robots=("ojas",),
         ),
         Kind(
             "slope",
@@ -119,15 +141,61 @@ KINDS: dict[str, Kind] = {
                 Parameter("roll_deg", "deg", -20.0, 20.0, 0.0, "above zero the ground rises to the left"),
             ),
             scalar="pitch_deg",
+            robots=("ojas",),
+        ),
+        Kind(
+            "wind",
+            "Moving air: a steady wind, ambient air that wanders (an Ornstein-Uhlenbeck process in each direction, "
+            "calm at the start), and the jet of a fan (Gaussian across its axis, its speed fluctuating likewise). It "
+            "acts through the rotors' drag; see `artde_gym.disturbances.wind`.",
+            (
+                Parameter("scale", "1", 0.0, 10.0, 1.0, "times which all of it is stronger"),
+                Parameter("steady", "m/s", -20.0, 20.0, (0.0, 0.0, 0.0), "velocity of the steady wind", size=3),
+                Parameter("ambient", "m/s", 0.0, 10.0, 0.5, "standard deviation of each component of the ambient air"),
+                Parameter("ambient_time", "s", 0.01, 100.0, 1.0, "its correlation time"),
+                Parameter("fan_speed", "m/s", 0.0, 20.0, 4.0, "mean speed on the jet's axis; 0 for no fan"),
+                Parameter("fan_place", "m", -10.0, 10.0, (0.9, 0.0, 0.7), "a point on the jet's axis", size=3),
+                Parameter(
+                    "fan_direction",
+                    "1",
+                    -1e3,
+                    1e3,
+                    (0.0, 1.0, 0.0),
+                    "along which the jet blows; any length",
+                    size=3,
+                    nonzero=True,
+                ),
+                Parameter(
+                    "fan_radius", "m", 0.05, 10.0, 0.3, "standard deviation of the jet's profile across its axis"
+                ),
+                Parameter("turbulence", "1", 0.0, 1.0, 0.25, "standard deviation of the jet's speed over its mean"),
+                Parameter("turbulence_time", "s", 0.01, 10.0, 0.1, "its correlation time"),
+            ),
+            scalar="scale",
+            robots=("q450",),
+        ),
+        Kind(
+            "ground_effect",
+            "Rotors lift more close above the ground; see `artde_gym.disturbances.ground_effect`.",
+            (Parameter("strength", "1", 0.0, 10.0, 1.0, "times which the published gain of thrust is larger"),),
+            scalar="strength",
+            robots=("q450",),
         ),
         Kind(
             "sensor_noise",
             "White Gaussian noise on measurements, by standard deviation.",
             (
-                Parameter("position", "rad", 0.0, 0.1, 0.0, "joint angles"),
-                Parameter("velocity", "rad/s", 0.0, 10.0, 0.0, "joint velocities"),
-                Parameter("tilt", "rad", 0.0, 0.5, 0.0, "roll and pitch of the base"),
-                Parameter("angular_velocity", "rad/s", 0.0, 10.0, 0.0, "of the base"),
+                Parameter("position", "rad or m", 0.0, 0.1, 0.0, "joint angles (rad), or a vehicle's position (m)"),
+                Parameter(
+                    "velocity",
+                    "rad/s or m/s",
+                    0.0,
+                    10.0,
+                    0.0,
+                    "joint velocities (rad/s), or a vehicle's velocity (m/s)",
+                ),
+                Parameter("tilt", "rad", 0.0, 0.5, 0.0, "roll and pitch of the base, or a vehicle's whole attitude"),
+                Parameter("angular_velocity", "rad/s", 0.0, 10.0, 0.0, "of the base or vehicle"),
             ),
             scalar="position",
         ),
@@ -136,6 +204,7 @@ KINDS: dict[str, Kind] = {
             "Joint encoders of so many counts a turn; joint velocities are then differences of counts.",
             (Parameter("bits", "1", 6, 32, None, "2^bits counts a turn", integer=True),),
             scalar="bits",
+            robots=("ojas",),
         ),
         Kind(
             "torque_delay",
@@ -145,13 +214,13 @@ KINDS: dict[str, Kind] = {
         ),
         Kind(
             "motor_lag",
-            "Torques follow commands as a first-order lag.",
-            (Parameter("time_constant", "s", 0.0, 1.0, None, "of the lag"),),
+            "Torques, or thrusts of rotors, follow commands as a first-order lag.",
+            (Parameter("time_constant", "s", 0.0, 1.0, None, "of the lag; for rotors in place of their own 0.035 s"),),
             scalar="time_constant",
         ),
         Kind(
             "actuator_loss",
-            "A joint gives a share of the commanded torque only.",
+            "A joint gives a share of the commanded torque only, or a rotor a share of its thrust.",
             (
                 _word("joint", "joint", None, f"which one, or {ALL!r}"),
                 Parameter("factor", "1", 0.0, 1.0, 0.0, "share that is left"),
@@ -161,7 +230,7 @@ KINDS: dict[str, Kind] = {
         ),
         Kind(
             "mass_error",
-            "All links are heavier or lighter than the nominal model, inertia included.",
+            "The robot is heavier or lighter than the nominal model, in all links, inertia included.",
             (Parameter("factor", "1", 0.5, 2.0, None, "true over nominal mass"),),
             scalar="factor",
         ),
@@ -173,6 +242,13 @@ KINDS: dict[str, Kind] = {
                 Parameter("offset", "rad", -0.5, 0.5, None, "added to the reference angle"),
             ),
             repeated=True,
+            robots=("ojas",),
+        ),
+        Kind(
+            "initial_position",
+            "The episode starts off the reference path, at rest.",
+            (Parameter("offset", "m", -0.3, 0.3, None, "added to the reference position", size=3),),
+            robots=("q450",),
         ),
     )
 }
@@ -192,21 +268,27 @@ What happens to a robot beyond its own dynamics, as data: one JSON-able grammar 
 In place of any number stands a number or a distribution: `{"uniform": [low, high]}`, `{"normal": [mean, std]}` (drawn
 again until it lies in the allowed range) or `{"choice": [...]}`, whose items are vectors where the parameter is one.
 Values are drawn at each reset from the environment's own seeded generator; `info["disturbances"]` holds what was drawn,
-in the same grammar. Several kinds act together; kinds marked *list* take several entries. Anything outside the grammar
-raises `DisturbanceError` when the environment is made or reset, with the key, the value and what is allowed.
+in the same grammar. Several kinds act together; kinds marked *list* take several entries. Anything outside the grammar,
+or a kind that the environment's robot does not honour, raises `DisturbanceError` when the environment is made or reset,
+with the key, the value and what is allowed.
 
 """
 
 
 def page() -> str:
     """The grammar as a Markdown page, from the tables that check it."""
-    lines = []
+    lines = [f"| kind | {' | '.join(f'`{robot}`' for robot in ROBOTS)} |", "|---|" + "---|" * len(ROBOTS)]
+    for kind in KINDS.values():
+        marks = ("yes" if robot in kind.robots else "" for robot in ROBOTS)
+        lines += [f"| `{kind.name}` | {' | '.join(marks)} |"]
+    lines += [""]
     for kind in KINDS.values():
         marks = " (list)" if kind.repeated else ""
         lines += [f"## `{kind.name}`{marks}", "", kind.text, "", "| parameter | unit | allowed | default | meaning |"]
         lines += ["|---|---|---|---|---|"]
         for parameter in kind.parameters:
             default = "required" if parameter.default is None else f"`{parameter.default}`"
+            default += "".join(f"; {robot}: `{value}`" for robot, value in parameter.other_defaults.items())
             text = parameter.text + (" (what a bare number stands for)" if parameter.name == kind.scalar else "")
             row = (f"`{parameter.name}`", parameter.unit, allowed(parameter), default, text)
             lines.append("| " + " | ".join(row) + " |")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import math
 import operator
 from collections.abc import Callable, Mapping
@@ -18,6 +17,8 @@ from artde_gym.disturbances.actuation import Actuation
 from artde_gym.disturbances.ground import LOADED, GrfPulse
 from artde_gym.disturbances.schedule import Schedule
 from artde_gym.disturbances.sensing import Sensing
+from artde_gym.envs.documentation import filled
+from artde_gym.envs.options import disturbances_in, steps_per_period
 from artde_gym.errors import ActionError, OptionError
 from artde_gym.layout import Field, Layout
 from artde_gym.references.walking import WalkingPattern, hip_height_above_ankle, walking_pattern
@@ -27,6 +28,7 @@ from artde_gym.robots.ojas import ActuatorInertia, ojas
 from artde_gym.robots.support import Supported
 from artde_gym.sim.engine import Camera, Engine, State
 from artde_gym.sim.factory import EngineName, make_engine
+from artde_gym.tracking import Effort, Tracked, Tracking
 
 TIME_STEP = 0.001  # s, of the physics
 FRICTION = 0.8  # of feet and ground
@@ -71,6 +73,21 @@ ACTION = Layout(
     (Field("tau", N_JOINTS, "Nm", -robot.TORQUE_LIMIT, robot.TORQUE_LIMIT, "leg joint torques, left then right"),)
 )
 FOOT_SITES = ("left_foot", "right_foot")
+
+_RIGHT_LEG = {f"q{i + 1}": N_JOINTS // 2 + i for i in range(N_JOINTS // 2)}  # what the thesis' tables show
+TRACKING = Tracking(
+    errors=(Tracked("deg", 180.0 / math.pi, _RIGHT_LEG, lambda fields: fields["q_ref"] - fields["q"]),),
+    norm=False,
+    band=math.radians(0.5),
+    efforts=(Effort("torque", "nm", "tau_applied", slice(N_JOINTS), _RIGHT_LEG),),
+    power=lambda fields: np.abs(fields["tau_applied"] * fields["qd"]).sum(axis=-1),
+    limited="tau_applied",
+    near=0.0,
+    tde_errors={"tde_error_rms": "sigma"},
+    means={"robust_gain_mean": "c"},
+    told=("foot_loads",),
+    speed=lambda fields: fields["base_velocity"][..., 0],
+)
 
 REWARD_SCALES: dict[str, float] = {
     "alive": 1.0,
@@ -158,8 +175,7 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
     default_disturbances: ClassVar[Mapping[str, Any]] = {}
     action_layout = ACTION
     robot_name = "ojas"
-    reported_axes: ClassVar[dict[str, int]] = {f"q{i + 1}": N_JOINTS // 2 + i for i in range(N_JOINTS // 2)}
-    """Columns of q that tables show: the right leg, as in the thesis."""
+    tracking = TRACKING
 
     def __init__(
         self,
@@ -182,7 +198,7 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         model = ojas(actuator_inertia, arms=arms)
         self._sites = [name for name, _, _ in model.sites]
         self._disturbances = self._parse(self.default_disturbances if disturbances is None else disturbances)
-        self._substeps = _substeps(control_period)
+        self._substeps = steps_per_period(control_period, TIME_STEP)
         self.control_period = self._substeps * TIME_STEP
         self._engine: Engine = make_engine(engine, model, TIME_STEP, renders=render_mode is not None)
         self.pattern = walking_pattern(speed, step_duration, duration, TIME_STEP)
@@ -210,7 +226,9 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
             DisturbanceError: for a malformed disturbance.
         """
         super().reset(seed=seed)
-        self._read_options(options or {})
+        disturbances = disturbances_in(options or {}, self)
+        if disturbances is not None:
+            self._disturbances = self._parse(disturbances)
         realised = self._disturbances.draw(self.np_random)
         self._k = 0
         self._tau = self._begin(realised)
@@ -256,22 +274,7 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         self._engine.close()
 
     def _parse(self, disturbances: Mapping[str, Any]) -> Disturbances:
-        return Disturbances.parse(disturbances, self._sites, self.nominal_robot.actuated)
-
-    def _read_options(self, options: Mapping[str, Any]) -> None:
-        for key in options:
-            if key not in ("disturbances", "scenario"):
-                raise OptionError("reset option", key, "'disturbances', 'scenario'")
-        if options.get("scenario") is not None:
-            from artde_gym.evaluation.scenarios import scenario  # scenarios name environments, so not at the top
-
-            entry = scenario(options["scenario"])
-            for name, value in entry.kwargs.items():
-                if getattr(self, name) != value:
-                    raise OptionError(f"{name} of this environment", getattr(self, name), f"{value!r} in {entry.name}")
-            self._disturbances = self._parse(entry.disturbances)
-        if options.get("disturbances") is not None:
-            self._disturbances = self._parse(options["disturbances"])
+        return Disturbances.parse(disturbances, self._sites, self.nominal_robot.actuated, self.robot_name)
 
     def _begin(self, realised: Mapping[str, Any]) -> Array:
         """Set an episode up and let the robot come to rest in it; returns the joint torques in the end."""
@@ -378,16 +381,6 @@ def _gravity(pitch_deg: float = 0.0, roll_deg: float = 0.0) -> tuple[float, floa
     return (-size * ahead, -size * left, -size)
 
 
-def _substeps(control_period: float) -> int:
-    allowed = f"whole multiples of {TIME_STEP} s up to 0.05 s"
-    if not (isinstance(control_period, (int, float)) and math.isfinite(control_period)):
-        raise OptionError("control_period", control_period, allowed)
-    substeps = round(control_period / TIME_STEP)
-    if not (1 <= substeps <= 50 and math.isclose(substeps * TIME_STEP, control_period, rel_tol=1e-9)):
-        raise OptionError("control_period", control_period, allowed)
-    return substeps
-
-
 def _plan(pattern: WalkingPattern, substeps: int) -> Array:
     """What the observation takes from the pattern, one row a control period."""
     columns = (pattern.q, pattern.qd, pattern.qdd, pattern.load_left[:, None], pattern.phase[:, None])
@@ -403,11 +396,4 @@ def _roll_pitch(state: State) -> tuple[float, float]:
 
 def document(default: str) -> Callable[[type[BipedEnv]], type[BipedEnv]]:
     """Class decorator: fill the sections that all tasks share into a docstring, at `{shared}`."""
-
-    def filled(task: type[BipedEnv]) -> type[BipedEnv]:
-        own = inspect.cleandoc(str(task.__doc__))
-        shared = TASK_DOCUMENTATION.format(observation=OBSERVATION.table(), default=default)
-        task.__doc__ = own.format(shared=shared)
-        return task
-
-    return filled
+    return filled(shared=TASK_DOCUMENTATION.format(observation=OBSERVATION.table(), default=default))

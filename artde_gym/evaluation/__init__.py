@@ -2,7 +2,21 @@
 
 from artde_gym.evaluation.evaluate import evaluate
 from artde_gym.evaluation.frontier import Frontier, frontier
+from artde_gym.evaluation.reproduce import Reproduction, reproduce
 from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.scenarios import SCENARIOS, Scenario, scenario
+from artde_gym.evaluation.tune import Tuning, tune
 
-__all__ = ["SCENARIOS", "Frontier", "Result", "Scenario", "evaluate", "frontier", "scenario"]
+__all__ = [
+    "SCENARIOS",
+    "Frontier",
+    "Reproduction",
+    "Result",
+    "Scenario",
+    "Tuning",
+    "evaluate",
+    "frontier",
+    "reproduce",
+    "scenario",
+    "tune",
+]

@@ -1,116 +1,323 @@
-"""Numbers of one episode, from its recorded signals."""
+"""Numbers of episodes, from their signals as time goes on: no more than a block of samples has to be in memory.
+
+Columns by what `Tracking` declares; u is the unit of a tracked error, and the first one tracked is the main one.
+
+Per axis: `rmse_u_<axis>`, `max_abs_error_u_<axis>`, and for each effort `rms_<effort>_<unit>_<axis>`; the same with
+`_phase1_<axis>`, ... for each phase, NaN for a part that the episode did not reach. Per episode:
+
+- `rmse_u`: root of the mean square of the main error's size, over time.
+- `iae_u_s`, `itae_u_s2`: integral of the main error, and of time times it. The error is the norm, or the mean absolute
+  value, as its size is the norm or the root mean square.
+- `<effort>_variation_<unit>_s`: mean over its components of sum |f_k - f_k-1|, a second.
+- `saturation`: share of samples with an actuator at its limit.
+- `energy_j`: integral of the power; `cost_of_transport`: energy / (m g distance), NaN below 0.1 m.
+- `tde_error_rms`, ...: root mean square of the error of time-delay estimation (rad/s^2, m/s^2).
+- `robust_gain_mean`, ...: mean of the law's robust gain c.
+- `peak_error_u_<event>`: largest size of the main error from the beginning of a push, or the payload's drop, until 2 s
+  after its end.
+- `recovery_time_s_<event>`: time from the end of each push, or the drop, until the size of the main error stays for 1 s
+  in its band, or below its largest value in the 2 s before if that is more; infinite if it never does.
+"""
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
+from artde_gym.disturbances.kinds import NEVER
+from artde_gym.layout import Layout
+from artde_gym.tracking import Fields, Tracked, Tracking
 
 GRAVITY = 9.81  # m/s^2
-RECOVERY_BAND = np.radians(0.5)  # rad, joint error (RMS over joints) that counts as recovered
-RECOVERY_HOLD = 1.0  # s, for which it must stay there
+BEFORE = 2.0  # s before a disturbance, whose largest error counts as recovered too
+AFTER = 2.0  # s after it, in which its peak is looked for
+HOLD = 1.0  # s, for which a recovered error must stay in its band
+NEAR = 0.1  # m, below which a distance has no cost of transport
+END = 2**62  # a sample that no episode reaches
+
+Span = tuple[float, float]
+Mask = NDArray[np.bool_]
 
 
-@dataclasses.dataclass(frozen=True)
-class Recording:
-    """Signals of one episode at every control period.
-
-    Attributes:
-        period: s.
-        fields: observations by field name, (samples, size); the last row is the final observation.
-        limit: largest force of each actuator.
-        axes: reported axis -> its column in q.
-        mass: of the robot with its payload (kg).
-        pushes: (start, end) of each push (s).
-        phases: (start, end) of parts that are measured one by one too (s).
-        sigma: TDE errors at the trace's rate, (samples, n); None for a policy without.
-    """
-
-    period: float
-    fields: Mapping[str, Array]
-    limit: Array
-    axes: Mapping[str, int]
-    mass: float
-    pushes: tuple[tuple[float, float], ...] = ()
-    phases: tuple[tuple[float, float], ...] = ()
-    sigma: Array | None = None
-
-
-def episode_metrics(recording: Recording) -> dict[str, Any]:
-    """All metrics of section "Metrics" of the documentation, by column name.
-
-    Per axis: `rmse_deg`, `max_abs_error_deg`, `rms_torque_nm`; the same with `_phase1`, ... for each phase. Per
-    episode, over all joints:
-
-    - `rmse_deg`: root of the mean square error over joints and time.
-    - `iae_deg_s`, `itae_deg_s2`: integral of the mean absolute error, and of time times it.
-    - `torque_variation_nm_s`: mean over joints of sum |tau_k - tau_k-1|, a second.
-    - `saturation`: share of samples with a joint at its limit.
-    - `energy_j`: integral of sum |tau qd|; `cost_of_transport`: energy / (m g distance), NaN below 0.1 m.
-    - `tde_error_rms`: root mean square of sigma (rad/s^2).
-    - `recovery_time_s_push0`, ...: time from the end of each push until the joint error (RMS over joints) stays for 1 s
-      within 0.5 degrees, or within its largest value in the 2 s before the push if that is more; infinite if it never
-      does.
-    """
-    fields, period = recording.fields, recording.period
-    error = fields["q_ref"] - fields["q"]
-    torque = fields["tau_applied"][1:]
-    time = period * np.arange(1, len(torque) + 1)
-    absolute = np.degrees(np.abs(error[1:]).mean(axis=1))
-    power = np.abs(torque * fields["qd"][1:]).sum(axis=1)
-    energy = float(power.sum() * period)
-    distance = float(fields["base_velocity"][:, 0].sum() * period)
-    metrics = _axis_metrics(recording, 0, len(error), "")
-    for number, (start, end) in enumerate(recording.phases, start=1):
-        last = len(error) if end == float("inf") else round(end / period)
-        metrics |= _axis_metrics(recording, round(start / period), last, f"phase{number}_")
-    for number, push in enumerate(recording.pushes):
-        metrics[f"recovery_time_s_push{number}"] = recovery_time(error, period, *push)
-    sigma = recording.sigma
-    return metrics | {
-        "rmse_deg": float(np.degrees(_rms(error))),
-        "iae_deg_s": float(absolute.sum() * period),
-        "itae_deg_s2": float((time * absolute).sum() * period),
-        "torque_variation_nm_s": float(np.abs(np.diff(torque, axis=0)).sum(axis=0).mean() / (len(torque) * period)),
-        "saturation": float((np.abs(torque) >= recording.limit).any(axis=1).mean()),
-        "energy_j": energy,
-        "cost_of_transport": energy / (recording.mass * GRAVITY * distance) if distance > 0.1 else float("nan"),
-        "tde_error_rms": float("nan") if sigma is None else _rms(sigma),
+def events_of(disturbances: Mapping[str, Any]) -> dict[str, Span]:
+    """Name -> (begin, end) (s) of each push, and of the payload's drop if there is one."""
+    events = {
+        f"push{i}": (push["start"], push["start"] + push["duration"])
+        for i, push in enumerate(disturbances.get("push", ()))
     }
+    payload = disturbances.get("payload", {"attach": 0.0, "drop": NEVER})
+    if payload["attach"] < payload["drop"] < NEVER:
+        events["drop"] = (payload["drop"], payload["drop"])
+    return events
 
 
-def _axis_metrics(recording: Recording, first: int, last: int, prefix: str) -> dict[str, Any]:
-    """Metrics of each reported axis over the samples [first, last); NaN for a part that the episode did not reach."""
-    error = recording.fields["q_ref"][first:last] - recording.fields["q"][first:last]
-    torque = recording.fields["tau_applied"][max(first, 1) : last]  # of the period that ends with its sample
-    metrics: dict[str, Any] = {}
-    for axis, column in recording.axes.items():
-        reached = len(error) > 0
-        peak = np.abs(error[:, column]).max() if reached else np.nan
-        metrics[f"rmse_deg_{prefix}{axis}"] = float(np.degrees(_rms(error[:, column]))) if reached else np.nan
-        metrics[f"max_abs_error_deg_{prefix}{axis}"] = float(np.degrees(peak))
-        metrics[f"rms_torque_nm_{prefix}{axis}"] = _rms(torque[:, column]) if reached else np.nan
-    return metrics
+class Metrics:
+    """Metrics of n episodes that run side by side.
+
+    Args:
+        tracking: of the environment.
+        layout: of its observations.
+        period: of control (s).
+        masses: of the robot with its payload (kg), one an episode.
+        events: see `events_of`, one mapping an episode.
+        phases: (begin, end) (s) of parts that are measured one by one too.
+    """
+
+    def __init__(
+        self,
+        tracking: Tracking,
+        layout: Layout,
+        period: float,
+        masses: Sequence[float],
+        events: Sequence[Mapping[str, Span]],
+        phases: Sequence[Span] = (),
+    ) -> None:
+        self._tracking, self._period = tracking, period
+        self._masses = np.array(masses, dtype=np.float64)
+        box, part = layout.box(), layout[tracking.limited]
+        near = tracking.near * (box.high - box.low)[part]
+        self._limits = box.low[part] + near, box.high[part] - near
+        n = len(events)
+        spans = {"": (0.0, np.inf)} | {f"phase{i}_": span for i, span in enumerate(phases, start=1)}
+        self._windows = {
+            prefix: (_sample(begin, period), _sample(end, period)) for prefix, (begin, end) in spans.items()
+        }
+        self._errors = {prefix: [_Squares(n) for _ in tracking.errors] for prefix in spans}
+        self._efforts = {prefix: [_Squares(n) for _ in tracking.efforts] for prefix in spans}
+        self._size, self._sigmas = _Squares(n), {column: _Squares(n) for column in tracking.tde_errors}
+        self._means = {column: _Mean(n) for column in tracking.means}
+        self._variations = [_Variation(n) for _ in tracking.efforts]
+        self._iae, self._itae, self._saturated, self._energy, self._distance = np.zeros((5, n))
+        names = dict.fromkeys(name for one in events for name in one)
+        never = (np.inf, np.inf)
+        self._events = {name: _Event([one.get(name, never) for one in events], tracking.band, period) for name in names}
+        self._count = np.zeros(n, dtype=np.int64)  # samples of each episode so far
+
+    def add(self, start: int, fields: Fields, diagnostics: Fields | None, live: Mask | None = None) -> None:
+        """Take in a block of samples; those of an episode come once each, in order.
+
+        Args:
+            start: which sample the first one is; the first of an episode is 0.
+            fields: observations by name, (samples, n, size).
+            diagnostics: of the policy at these samples, (samples, n, ...), or at some of them if no error is taken from
+                there; None where the policy had nothing to decide any more.
+            live: (n,), the episodes whose samples these are; None for all.
+        """
+        tracking = self._tracking
+        live = None if live is None or live.all() else live
+        samples = len(fields[tracking.limited])
+        self._count += samples if live is None else samples * live
+        for number, tracked in enumerate(tracking.errors):
+            error = _error(tracked, fields, diagnostics)
+            if error is None:
+                continue
+            for prefix, (first, stop) in self._windows.items():
+                self._errors[prefix][number].add(error[_part(first, stop, start)], live)
+            if number == 0:
+                self._add_main(error, start, live)
+        for number, effort in enumerate(tracking.efforts):
+            force = fields[effort.field][..., effort.part]
+            for prefix, (first, stop) in self._windows.items():
+                self._efforts[prefix][number].add(force[_part(max(first, 1), stop, start)], live)
+            self._variations[number].add(force[_part(1, END, start)], live)
+        acted = _part(1, END, start)  # what the first observation tells of acted before this episode
+        low, high = self._limits
+        values = fields[tracking.limited][acted]
+        self._saturated += _sum(np.any((values <= low) | (values >= high), axis=-1), live)
+        self._energy += _sum(tracking.power(fields)[acted], live)
+        if tracking.speed is not None:
+            self._distance += _sum(tracking.speed(fields), live)
+        for column, name in tracking.tde_errors.items():
+            if diagnostics is not None and name in diagnostics:
+                self._sigmas[column].add(diagnostics[name], live)
+        for column, name in tracking.means.items():
+            if diagnostics is not None and name in diagnostics:
+                self._means[column].add(diagnostics[name], live)
+
+    def _add_main(self, error: Array, start: int, live: Mask | None) -> None:
+        size = np.sqrt(np.square(error).sum(axis=-1) if self._tracking.norm else np.square(error).mean(axis=-1))
+        absolute = (size if self._tracking.norm else np.abs(error).mean(axis=-1))[_part(1, END, start)]
+        time = self._period * np.arange(max(start, 1), start + len(error))
+        self._size.add(size[..., None], live)
+        self._iae += _sum(absolute, live)
+        self._itae += _sum(time[:, None] * absolute, live)
+        for event in self._events.values():
+            event.add(size, start, live)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """The columns at the top, one row an episode."""
+        tracking, period = self._tracking, self._period
+        main = tracking.errors[0]
+        unit, scale = main.unit, main.scale
+        columns: dict[str, Array] = {}
+        for prefix in self._windows:
+            for tracked, squares in zip(tracking.errors, self._errors[prefix], strict=True):
+                for axis, i in tracked.axes.items():
+                    columns[f"rmse_{tracked.unit}_{prefix}{axis}"] = tracked.scale * squares.rms[:, i]
+                    columns[f"max_abs_error_{tracked.unit}_{prefix}{axis}"] = tracked.scale * squares.peak[:, i]
+            for effort, squares in zip(tracking.efforts, self._efforts[prefix], strict=True):
+                for axis, i in effort.axes.items():
+                    columns[f"rms_{effort.name}_{effort.unit}_{prefix}{axis}"] = squares.rms[:, i]
+        for name, event in self._events.items():
+            columns[f"recovery_time_s_{name}"] = event.recovery_time(self._count)
+            columns[f"peak_error_{unit}_{name}"] = scale * event.peak
+        columns[f"rmse_{unit}"] = scale * self._size.rms[:, 0]
+        columns[f"iae_{unit}_s"] = scale * period * self._iae
+        columns[f"itae_{unit}_s2"] = scale * period * self._itae
+        acted = np.maximum(self._count - 1, 1)  # control periods
+        for effort, variation in zip(tracking.efforts, self._variations, strict=True):
+            columns[f"{effort.name}_variation_{effort.unit}_s"] = variation.total / (acted * period)
+        columns["saturation"] = self._saturated / acted
+        columns["energy_j"] = energy = period * self._energy
+        if tracking.speed is not None:
+            far = np.where(period * self._distance > NEAR, period * self._distance, np.nan)
+            columns["cost_of_transport"] = energy / (self._masses * GRAVITY * far)
+        columns |= {column: squares.rms_of_all for column, squares in self._sigmas.items()}
+        columns |= {column: mean.value for column, mean in self._means.items()}
+        return [
+            dict(zip(columns, row, strict=True))
+            for row in zip(*(values.tolist() for values in columns.values()), strict=True)
+        ]
 
 
-def recovery_time(error: Array, period: float, start: float, end: float) -> float:
-    """Time from a push's end (s) until the error (samples, n) (rad) is back in its band for good measure."""
-    size = np.sqrt((error**2).mean(axis=1))
-    first, last = round(start / period), round(end / period)
-    if last >= len(size):
-        return float("nan")  # the episode ended before the push did
-    before = size[max(0, first - round(2.0 / period)) : first + 1]
-    outside = size[last:] > max(RECOVERY_BAND, float(before.max()))
-    hold = min(round(RECOVERY_HOLD / period), len(outside))
-    # number of samples outside the band in [k, k + hold)
-    count = np.convolve(outside, np.ones(hold), mode="valid")
-    recovered = np.flatnonzero(count < 0.5)
-    return float(recovered[0] * period) if len(recovered) else float("inf")
+class _Squares:
+    """Mean squares and peaks of vectors in n episodes."""
+
+    def __init__(self, n: int) -> None:
+        self._sums: Array = np.zeros((n, 1))
+        self._largest: Array = np.full((n, 1), np.nan)
+        self._number = np.zeros(n, dtype=np.int64)
+
+    def add(self, values: Array, live: Mask | None) -> None:
+        """Take in (samples, n, size)."""
+        squares = np.square(values)
+        self._sums = self._sums + _sum(squares, live)
+        self._largest = np.fmax(self._largest, _largest(squares, live))
+        self._number += len(values) if live is None else len(values) * live
+
+    @property
+    def rms(self) -> Array:
+        """(n, size), each component's root mean square."""
+        return np.sqrt(self._sums / _or_nan(self._number)[:, None])
+
+    @property
+    def rms_of_all(self) -> Array:
+        """(n,), the root mean square of all components together."""
+        return np.sqrt(self._sums.mean(axis=-1) / _or_nan(self._number))
+
+    @property
+    def peak(self) -> Array:
+        """(n, size), each component's largest absolute value."""
+        return np.sqrt(self._largest)
 
 
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
+class _Mean:
+    """Means of numbers in n episodes."""
+
+    def __init__(self, n: int) -> None:
+        self._sums, self._number = np.zeros(n), np.zeros(n, dtype=np.int64)
+
+    def add(self, values: Array, live: Mask | None) -> None:
+        """Take in (samples, n)."""
+        self._sums += _sum(values, live)
+        self._number += len(values) if live is None else len(values) * live
+
+    @property
+    def value(self) -> Array:
+        return self._sums / _or_nan(self._number)
+
+
+class _Variation:
+    """Total variation of vectors in n episodes, mean over their components."""
+
+    def __init__(self, n: int) -> None:
+        self.total = np.zeros(n)
+        self._last: Array | None = None
+
+    def add(self, values: Array, live: Mask | None) -> None:
+        """Take in (samples, n, size)."""
+        if len(values):
+            joined = values if self._last is None else np.concatenate([self._last, values])
+            self.total += _sum(np.abs(np.diff(joined, axis=0)).mean(axis=-1), live)
+            last = values[-1:]
+            self._last = last if live is None or self._last is None else np.where(live[:, None], last, self._last)
+
+
+class _Event:
+    """What follows a disturbance in n episodes: the peak, and the recovery."""
+
+    def __init__(self, spans: Sequence[Span], band: float, period: float) -> None:
+        self._begin, self._end = np.array([[_sample(time, period) for time in span] for span in spans]).T
+        self._before, self._after, self._hold = (_sample(time, period) for time in (BEFORE, AFTER, HOLD))
+        self._period = period
+        self._band = np.full(len(spans), band)
+        self._outside = self._end - 1  # the last sample outside the band, from the end of the disturbance on
+        self._recovered = np.full(len(spans), -1)  # the sample from which on it held, once it has
+        self.peak: Array = np.full(len(spans), np.nan)
+
+    def add(self, size: Array, start: int, live: Mask | None) -> None:
+        """Take in sizes of errors (samples, n), of which the first is sample `start`."""
+        k = np.arange(start, start + len(size))[:, None]
+        if k[-1, 0] < self._begin.min() - self._before:
+            return
+        counts = True if live is None else live
+        before = (k >= self._begin - self._before) & (k <= self._begin) & counts
+        self._band = np.maximum(self._band, np.where(before, size, 0.0).max(axis=0))
+        near = (k >= self._begin) & (k <= self._end + self._after) & counts
+        self.peak = np.fmax(self.peak, np.fmax.reduce(np.where(near, size, np.nan), axis=0))
+        since = (k >= self._end) & counts
+        outside = np.maximum.accumulate(np.where(since & (size > self._band), k, self._outside), axis=0)
+        held = since & (k - outside >= self._hold)
+        here = held.any(axis=0) & (self._recovered < 0)
+        recovered = np.take_along_axis(outside, held.argmax(axis=0)[None], axis=0)[0] + 1
+        self._recovered = np.where(here, recovered, self._recovered)
+        self._outside = outside[-1]
+
+    def recovery_time(self, count: NDArray[np.int64]) -> Array:
+        """(n,) (s), for episodes of so many samples; where the rest is shorter than the hold, all of it must hold."""
+        after = count - self._end
+        holds = (self._recovered < 0) & (count - 1 - self._outside >= np.minimum(after, self._hold))
+        recovered = np.where(holds, self._outside + 1, self._recovered)
+        time = np.where(recovered < 0, np.inf, self._period * (recovered - self._end))
+        return np.where(after > 0, time, np.nan)
+
+
+def _error(tracked: Tracked, fields: Fields, diagnostics: Fields | None) -> Array | None:
+    if tracked.diagnostic is None:
+        return tracked.error(fields)
+    if diagnostics is None:
+        return None
+    return diagnostics[tracked.diagnostic] if tracked.diagnostic in diagnostics else tracked.error(fields)
+
+
+def _sample(time: float, period: float) -> int:
+    return round(min(time / period, END))
+
+
+def _part(first: int, stop: int, start: int) -> slice:
+    """Samples [first, stop) of a block that begins with sample `start`."""
+    return slice(max(first - start, 0), max(stop - start, 0))
+
+
+def _sum(values: Array | Mask, live: Mask | None) -> Array:
+    """Sum over a block's samples (samples, n, ...); zero in other episodes."""
+    total = values.sum(axis=0)
+    return total if live is None else np.where(_beside(live, total), total, 0)
+
+
+def _largest(values: Array, live: Mask | None) -> Array:
+    """Largest of a block's samples (samples, n, ...); NaN in other episodes."""
+    largest = np.fmax.reduce(values, axis=0, initial=np.nan)
+    return largest if live is None else np.where(_beside(live, largest), largest, np.nan)
+
+
+def _beside(live: Mask, values: Array) -> Mask:
+    return live.reshape(live.shape + (1,) * (values.ndim - 1))
+
+
+def _or_nan(number: NDArray[np.int64]) -> Array:
+    return np.where(number > 0, number, np.nan)

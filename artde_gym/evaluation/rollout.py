@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from artde_gym.evaluation.metrics import Recording, episode_metrics
+from artde_gym.evaluation.metrics import Metrics, Span, events_of
 
 Array = NDArray[Any]
 
@@ -37,7 +37,7 @@ def run_episode(
     *,
     options: dict[str, Any] | None = None,
     trace_hz: float = 100.0,
-    phases: tuple[tuple[float, float], ...] = (),
+    phases: Sequence[Span] = (),
     on_progress: Callable[[float], None] | None = None,
 ) -> Episode:
     """Drive `env` with `policy` from a seeded reset to the end.
@@ -47,7 +47,7 @@ def run_episode(
         seed: of the reset; the same seed has the same disturbances whatever the policy.
         options: of the reset.
         trace_hz: rate of the traces, at most the control rate; infinite for every sample.
-        phases: see `Recording`.
+        phases: see `Metrics`.
         on_progress: called with the simulated time (s) about once a simulated second.
     """
     plant = env.unwrapped
@@ -55,10 +55,11 @@ def run_episode(
     stride = max(1, round(1.0 / (trace_hz * period)))
     report_every = max(1, round(PROGRESS_INTERVAL / period))
     diagnose = getattr(policy, "diagnostics", None)
+    diagnosed_every = 1 if plant.tracking.diagnosed else stride
 
     observation, info = env.reset(seed=seed, options=options)
     disturbances = info["disturbances"]
-    observations, diagnostics = [observation], []
+    observations, diagnostics, told = [observation], [], [_told(plant, info)]
     state, episode_start = None, True
     terminated = truncated = False
     total = 0.0
@@ -66,44 +67,72 @@ def run_episode(
         action, state = policy.predict(observation, state=state, episode_start=episode_start, deterministic=True)
         episode_start = False
         count = len(observations)
-        if diagnose is not None and (count - 1) % stride == 0:
+        if diagnose is not None and (count - 1) % diagnosed_every == 0:
             diagnostics.append(diagnose(state))
         observation, reward, terminated, truncated, info = env.step(action)
         total += float(reward)
         observations.append(observation)
+        if count % stride == 0:
+            told.append(_told(plant, info))
         if on_progress is not None and count % report_every == 0:
             on_progress(info["time_s"])
 
     fields = plant.observation_layout.split(np.array(observations))
-    inside = _stack(diagnostics)
-    pushes = tuple((push["start"], push["start"] + push["duration"]) for push in disturbances.get("push", ()))
-    recording = Recording(
-        period=period,
-        fields=fields,
-        limit=plant.action_space.high,
-        axes=plant.reported_axes,
-        mass=plant.nominal_robot.mass + disturbances.get("payload", {}).get("mass", 0.0),
-        pushes=pushes,
-        phases=phases,
-        sigma=inside.get("sigma"),
-    )
-    row = {
-        "fell": bool(terminated),
-        "fall_reason": info.get("fall_reason", ""),
-        "time_to_fall_s": info["time_s"] if terminated else float("nan"),
-        "duration_s": info["time_s"],
-        "reward": total,
-        **episode_metrics(recording),
+    inside = stack(diagnostics)
+    metrics = metrics_for(plant, [disturbances], phases)
+    last = len(observations) - 1
+    metrics.add(0, _part(fields, np.s_[:last, None]), _part(inside, np.s_[:, None]))
+    metrics.add(last, _part(fields, np.s_[last:, None]), None)  # nothing was decided there any more
+    reason = info.get("fall_reason", "") if terminated else None
+    row = row_of(reason, info["time_s"], total, metrics.rows()[0], disturbances)
+    kept = slice(None, None, stride // diagnosed_every)
+    seen = _part(fields, slice(None, None, stride)) | stack(told)
+    return Episode(row, traces_of(stride * period, seen, _part(inside, kept)))
+
+
+def metrics_for(plant: Any, disturbances: Sequence[Mapping[str, Any]], phases: Sequence[Span]) -> Metrics:
+    """Metrics of episodes in an environment, from the realised disturbances of each."""
+    masses = [plant.nominal_robot.mass + one.get("payload", {}).get("mass", 0.0) for one in disturbances]
+    events = [events_of(one) for one in disturbances]
+    return Metrics(plant.tracking, plant.observation_layout, plant.control_period, masses, events, phases)
+
+
+def row_of(
+    fall_reason: str | None, time_s: float, reward: float, metrics: dict[str, Any], disturbances: dict[str, Any]
+) -> dict[str, Any]:
+    """One episode's row; `fall_reason` is None without a fall."""
+    fell = fall_reason is not None
+    return {
+        "fell": fell,
+        "fall_reason": fall_reason or "",
+        "time_to_fall_s": time_s if fell else float("nan"),
+        "duration_s": time_s,
+        "reward": reward,
+        **metrics,
         **_flatten(disturbances),
     }
-    traces = {"time": period * np.arange(0, len(observations), stride)}
-    traces.update({name: values[::stride].astype(np.float32) for name, values in fields.items()})
-    traces.update({f"policy.{name}": values.astype(np.float32) for name, values in inside.items()})
-    return Episode(row, traces)
 
 
-def _stack(samples: list[dict[str, Array]]) -> dict[str, Array]:
+def traces_of(period: float, fields: dict[str, Array], inside: dict[str, Array]) -> dict[str, Array]:
+    """Signals of one episode, sampled every `period` (s): observations (and more) and the policy's diagnostics."""
+    return {
+        "time": period * np.arange(len(next(iter(fields.values())))),
+        **{name: values.astype(np.float32) for name, values in fields.items()},
+        **{f"policy.{name}": values.astype(np.float32) for name, values in inside.items()},
+    }
+
+
+def stack(samples: list[dict[str, Array]]) -> dict[str, Array]:
+    """Samples of named arrays as named arrays of samples."""
     return {name: np.array([sample[name] for sample in samples]) for name in samples[0]} if samples else {}
+
+
+def _told(plant: Any, info: dict[str, Any]) -> dict[str, Array]:
+    return {name: np.array(info[name]) for name in plant.tracking.told}
+
+
+def _part(signals: dict[str, Array], part: Any) -> dict[str, Array]:
+    return {name: values[part] for name, values in signals.items()}
 
 
 def _flatten(disturbances: dict[str, Any]) -> dict[str, Any]:

@@ -11,6 +11,8 @@ from artde_gym.arrays import Array
 from artde_gym.robots.spec import RobotSpec, Vector
 from artde_gym.sim.rotation import Quaternion
 
+PAYLOAD_RADIUS = 0.08  # m, of the homogeneous ball
+
 
 class State(NamedTuple):
     """One robot at one instant; positions and velocities are those of the base link's origin, in world axes.
@@ -76,10 +78,6 @@ class Engine(Protocol):
         """The state now: after the last step, or as placed or restored. Later steps do not change what was read."""
         ...
 
-    def base_twist(self) -> tuple[Vector, Vector]:
-        """Velocity of the base link's origin (m/s) and angular velocity (rad/s), world axes: a cheap part of `read`."""
-        ...
-
     def step(self, tau: Array) -> None:
         """Advance one `time_step` under joint torques `tau` (n,) (Nm)."""
         ...
@@ -123,7 +121,7 @@ class Engine(Protocol):
         ...
 
     def attach_payload(self, mass: float, position: Vector) -> None:
-        """Fix a ball of `mass` (kg) to the base link, its centre at `position` in the base frame (m).
+        """Fix a ball of `mass` (kg) and `PAYLOAD_RADIUS` to the base link, its centre at `position` in its frame (m).
 
         It takes over the base's motion, touches nothing, and falls freely, also through the ground, once released. A
         former payload is gone.

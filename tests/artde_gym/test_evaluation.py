@@ -1,7 +1,8 @@
-"""The harness from outside: metrics on made-up signals, intervals against known values, folders that survive."""
+"""The harness from outside: intervals against known values, the same seeds for all, folders that survive."""
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import signal
@@ -14,14 +15,16 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from rich.console import Console
 from typer.testing import CliRunner
 
 import artde_gym
 from artde_gym.cli import app
+from artde_gym.envs import quadrotor_task
 from artde_gym.errors import ArtdeGymError, DisturbanceError, OptionError, StoreError, UnknownNameError
-from artde_gym.evaluation import SCENARIOS, Result, evaluate, statistics, thesis
+from artde_gym.evaluation import SCENARIOS, Result, evaluate, reproduce, statistics, thesis
+from artde_gym.evaluation.console import print_result
 from artde_gym.evaluation.evaluate import Update, episode_seed
-from artde_gym.evaluation.metrics import Recording, episode_metrics, recovery_time
 from controllers import GainError
 
 SHORT: dict[str, Any] = {"duration": 0.4, "control_period": 0.004, "actuator_inertia": "lumped"}
@@ -30,63 +33,6 @@ SHORT: dict[str, Any] = {"duration": 0.4, "control_period": 0.004, "actuator_ine
 def short(controllers: Any = ("tde", "artde"), **kwargs: Any) -> Result:
     kwargs.setdefault("scenario", "S2")
     return evaluate(controllers, **{"episodes": 2, "env_kwargs": SHORT, **kwargs})
-
-
-# ---------------------------------------------------------------- metrics
-
-
-def recording(error: np.ndarray, **fields: np.ndarray) -> Recording:
-    """A recording of 12 joints whose error is given and all else is zero."""
-    samples = len(error)
-    signals = {name: np.zeros((samples, 12)) for name in ("q", "qd", "tau_applied")}
-    signals["base_velocity"] = np.zeros((samples, 3))
-    signals.update(fields)
-    signals["q_ref"] = signals["q"] + error
-    return Recording(0.001, signals, np.full(12, 40.0), {"q1": 6, "q2": 7}, mass=9.0)
-
-
-def test_tracking_metrics_of_a_sine() -> None:
-    time = 0.001 * np.arange(10_001)  # ten whole periods
-    error = np.zeros((len(time), 12))
-    error[:, 6] = np.radians(2.0) * np.sin(2 * np.pi * time)
-    metrics = episode_metrics(recording(error))
-    assert metrics["rmse_deg_q1"] == pytest.approx(2 / np.sqrt(2), rel=1e-4)
-    assert metrics["max_abs_error_deg_q1"] == pytest.approx(2.0)
-    assert metrics["rmse_deg_q2"] == 0
-    assert metrics["rmse_deg"] == pytest.approx(2 / np.sqrt(2 * 12), rel=1e-4)
-    mean_error = 2 * (2 / np.pi) / 12
-    assert metrics["iae_deg_s"] == pytest.approx(10 * mean_error, rel=1e-3)
-    assert metrics["itae_deg_s2"] == pytest.approx(10 * 5 * mean_error, rel=1e-2)
-
-
-def test_effort_metrics_by_hand() -> None:
-    samples = 1001  # one second
-    torque = np.zeros((samples, 12))
-    torque[1:, 6] = 3.0
-    torque[1::2, 7] = 40.0  # saturated in every other sample, switching 40 Nm each time
-    qd = np.zeros((samples, 12))
-    qd[:, 6] = 0.5
-    forward = np.zeros((samples, 3))
-    forward[:, 0] = 0.2
-    metrics = episode_metrics(recording(np.zeros((samples, 12)), tau_applied=torque, qd=qd, base_velocity=forward))
-    assert metrics["rms_torque_nm_q1"] == pytest.approx(3.0)
-    assert metrics["rms_torque_nm_q2"] == pytest.approx(40 / np.sqrt(2))
-    assert metrics["saturation"] == pytest.approx(0.5)
-    assert metrics["energy_j"] == pytest.approx(3.0 * 0.5 * 1.0)
-    assert metrics["cost_of_transport"] == pytest.approx(1.5 / (9.0 * 9.81 * 0.2), rel=2e-3)
-    assert metrics["torque_variation_nm_s"] == pytest.approx(999 * 40 / 12)
-
-
-def test_recovery_time() -> None:
-    period = 0.01
-    error = np.zeros((1000, 12))
-    error[201:350] = np.radians(2.0)  # pushed from 2.0 to 2.2 s, back in the band at 3.5 s
-    assert recovery_time(error, period, 2.0, 2.2) == pytest.approx(1.3)
-    error[400] = np.radians(2.0)  # a relapse within the second that it has to hold
-    assert recovery_time(error, period, 2.0, 2.2) == pytest.approx(1.81)
-    error[201:] = np.radians(2.0)
-    assert recovery_time(error, period, 2.0, 2.2) == np.inf
-    assert np.isnan(recovery_time(error[:150], period, 2.0, 2.2))
 
 
 # ---------------------------------------------------------------- statistics
@@ -110,6 +56,22 @@ def test_bootstrap_interval_covers_the_mean_as_often_as_it_says() -> None:
         estimate = statistics.mean(rng.normal(3.0, 1.0, size=40))
         inside += estimate.low <= 3.0 <= estimate.high
     assert 0.88 <= inside / 200 <= 0.99
+
+
+def test_intervals_of_many_values_join_those_of_few() -> None:
+    """Beyond `MANY` values the central limit's interval takes over from the bootstrap's."""
+    rng = np.random.default_rng(0)
+    theirs = rng.gamma(4.0, size=statistics.MANY)
+    ours = 0.8 * theirs + 0.2 * rng.normal(size=statistics.MANY)
+    more = [np.append(values, values.mean()) for values in (ours, theirs)]
+    for few, many in (
+        (statistics.mean(ours), statistics.mean(more[0])),
+        (statistics.improvement(ours, theirs), statistics.improvement(*more)),
+    ):
+        assert many.n == few.n + 1 > statistics.MANY
+        assert many.value == pytest.approx(few.value, rel=1e-2)
+        for bound in ("low", "high"):
+            assert getattr(many, bound) == pytest.approx(getattr(few, bound), abs=0.06 * (few.high - few.low))
 
 
 def test_mean_of_few_and_of_broken_values() -> None:
@@ -148,8 +110,8 @@ def test_thesis_values_and_the_improvements_it_claims() -> None:
     assert thesis.value("S2", "tde", "rmse_deg", "q4") is None
     for rival, least in (("tde", 0.327), ("atde", 0.201)):
         gains = [
-            1 - thesis.VALUES["S1"]["artde"]["rmse_deg"][i] / thesis.VALUES["S1"][rival]["rmse_deg"][i]
-            for i in range(6)
+            1 - thesis.VALUES["S1"]["artde"]["rmse_deg"][joint] / thesis.VALUES["S1"][rival]["rmse_deg"][joint]
+            for joint in thesis.JOINTS
         ]
         assert min(gains) == pytest.approx(least, abs=5e-4)
 
@@ -279,6 +241,8 @@ def test_folder_holds_what_the_documentation_says(tmp_path: Path) -> None:
     assert traces["time"] == pytest.approx(0.008 * np.arange(51))  # 125 Hz is the nearest whole stride of 4 ms
     assert traces["q"].shape == (51, 12)
     assert {"policy.sigma", "policy.s", "policy.beta_0", "policy.beta_1"} <= set(traces)
+    assert traces["foot_loads"].shape == (51, 2)
+    assert traces["foot_loads"].sum(axis=1).mean() == pytest.approx(9.81 * (8.986 + 1.3), rel=0.05)  # it stands
 
 
 def test_traces_at_full_rate_on_request(tmp_path: Path) -> None:
@@ -347,12 +311,74 @@ def test_command_prints_ours_beside_the_thesis(tmp_path: Path) -> None:
         "RMS torque (Nm)",
         "3.264",
         "-36.5",
-        "walks",
+        "no fall",
+        "after disturbances",
     ):
         assert word in outcome.output
     listing = CliRunner().invoke(app, ["list"]).output
-    for word in ("BipedWalk-Payload-v0", "S2-L4", "artde-robust", "computed-torque"):
+    for word in ("BipedWalk-Payload-v0", "S2-L4", "artde-robust", "computed-torque", "single, batch", "wind.scale"):
         assert word in listing
+
+
+def test_reproduce_runs_both_robots_in_both_engines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("S1", "Q1"):
+        monkeypatch.setitem(SCENARIOS, name, dataclasses.replace(SCENARIOS[name], kwargs={"duration": 0.2}))
+    arguments = ["reproduce", "--scenario", "S1,Q1", "--episodes", "1", "--workers", "1", "--out", str(tmp_path)]
+    outcome = CliRunner().invoke(app, [*arguments, "--engine", "both"])
+    assert outcome.exit_code == 0, outcome.output
+    for word in ("S1: walk", "Table 2.1", "Q1: infinity", "Table 3.1", "nobody crashes", "geometric", "confirmed"):
+        assert word in outcome.output
+    for engine in ("bullet", "mujoco"):
+        assert set(pd.read_csv(tmp_path / engine / "biped" / "claims.csv")["scenario"]) == {"S1"}
+        assert set(pd.read_csv(tmp_path / engine / "quadrotor" / "claims.csv")["scenario"]) == {"Q1"}
+    assert CliRunner().invoke(app, [*arguments, "--robot", "biped"]).output.count("Table 3.1") == 0
+    assert run_command("reproduce", "--robot", "bipedal").returncode == 2
+
+
+def test_the_ablation_is_as_stiff_as_artde_was_in_the_same_scenario(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("S1", "S2"):
+        monkeypatch.setitem(SCENARIOS, name, dataclasses.replace(SCENARIOS[name], kwargs=SHORT))
+    found = reproduce("biped", tmp_path, scenarios=["S1", "S2"], episodes=2)
+    gains = {}
+    for name in ("S1", "S2"):
+        mean = found.result.values(name, "artde", "robust_gain_mean").mean()
+        record = json.loads((tmp_path / "ablation" / name / "summary.json").read_text())
+        gains[name] = record["configuration"]["gains"]["tde+kd"]["c"]
+        assert gains[name] == mean
+        again = evaluate(["tde+kd"], scenario=name, episodes=2, gains={"tde+kd": {"c": mean}})
+        assert again.values(name, "tde+kd", "rmse_deg").tobytes() == (
+            found.result.values(name, "tde+kd", "rmse_deg").tobytes()
+        )
+    assert gains["S1"] != gains["S2"]
+    with pytest.raises(OptionError, match="beside"):
+        reproduce("biped", tmp_path / "other", scenarios=["S1"], controllers=["tde", "tde+kd"])
+    assert not (tmp_path / "other").exists()
+
+
+def test_a_recovery_that_never_came_is_counted() -> None:
+    rows = [
+        {"scenario": "custom", "controller": "artde", "env": "QuadInfinity-Payload-v0", "episode": i, "seed": i}
+        | {"fell": False, "time_to_fall_s": np.nan, "duration_s": 1.0, "recovery_time_s_drop": time}
+        | {"peak_error_m_drop": 0.25}
+        for i, time in enumerate((1.0, 2.0, np.inf))
+    ]
+    tracking = quadrotor_task.TRACKING
+    for row in rows:
+        row |= {
+            f"{metric}_{tracked.unit}_{axis}": 0.1
+            for metric in ("rmse", "max_abs_error")
+            for tracked in tracking.errors
+            for axis in tracked.axes
+        }
+        row |= {f"rms_{effort.name}_{effort.unit}_{axis}": 0.1 for effort in tracking.efforts for axis in effort.axes}
+        row["rmse_m"] = 0.1
+    console = Console(record=True, width=100)
+    print_result(Result(pd.DataFrame(rows)), console)
+    text = console.export_text()
+    assert "1.50 (1 never)" in text
+    assert "0.2500" in text
 
 
 def run_command(*arguments: str) -> subprocess.CompletedProcess[str]:

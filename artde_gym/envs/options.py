@@ -1,0 +1,47 @@
+"""Arguments and reset options that all environments understand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from artde_gym.errors import OptionError
+
+
+def steps_per_period(control_period: float, step: float) -> int:
+    """How many steps of `step` (s) make a control period.
+
+    Raises:
+        OptionError: unless it is a whole number, and the period 0.05 s at most.
+    """
+    allowed = f"whole multiples of {step} s up to 0.05 s"
+    if not (isinstance(control_period, (int, float)) and math.isfinite(control_period)):
+        raise OptionError("control_period", control_period, allowed)
+    steps = round(control_period / step)
+    if not (1 <= steps <= round(0.05 / step) and math.isclose(steps * step, control_period, rel_tol=1e-9)):
+        raise OptionError("control_period", control_period, allowed)
+    return steps
+
+
+def disturbances_in(options: Mapping[str, Any], env: Any) -> Mapping[str, Any] | None:
+    """The disturbances that reset options ask for, as they are given or those of a scenario; None if they do not.
+
+    Raises:
+        OptionError: for an unknown option, or a scenario that needs other arguments than the environment has.
+        UnknownNameError: for an unknown scenario.
+    """
+    for key in options:
+        if key not in ("disturbances", "scenario"):
+            raise OptionError("reset option", key, "'disturbances', 'scenario'")
+    disturbances = None
+    if options.get("scenario") is not None:
+        from artde_gym.evaluation.scenarios import scenario  # scenarios name environments, so not at the top
+
+        entry = scenario(options["scenario"])
+        for name, value in entry.kwargs.items():
+            if getattr(env, name, None) != value:
+                raise OptionError(f"{name} of this environment", getattr(env, name, None), f"{value!r} in {entry.name}")
+        disturbances = entry.disturbances
+    given = options.get("disturbances")
+    return disturbances if given is None else given

@@ -1,0 +1,251 @@
+"""`QuadInfinity-Payload-v0`, one vehicle in a physics engine."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from artde_gym.arrays import Array
+from artde_gym.disturbances.ground_effect import thrust_gain
+from artde_gym.disturbances.noise import draw_keys
+from artde_gym.disturbances.rotors import Rotors
+from artde_gym.disturbances.schedule import Schedule
+from artde_gym.disturbances.wind import GRID, Wind
+from artde_gym.envs import quadrotor_task as task
+from artde_gym.envs.documentation import filled
+from artde_gym.envs.options import disturbances_in, steps_per_period
+from artde_gym.envs.quadrotor_sensors import Measurement, Sensors
+from artde_gym.errors import ActionError, OptionError
+from artde_gym.references.infinity import START
+from artde_gym.robots import q450 as robot
+from artde_gym.robots.spec import Vector
+from artde_gym.sim.engine import Camera, Engine
+from artde_gym.sim.factory import EngineName, make_engine
+
+TIME_STEP = 0.001  # s, of the physics
+STEPS = 5  # physics steps from one grid point to the next
+
+_NOTHING = (0.0, 0.0, 0.0)
+_NO_JOINTS = np.zeros(0)
+_WRENCH, _THRUST = task.OBSERVATION["wrench_applied"], task.OBSERVATION["rotor_thrust"]
+
+
+@filled(shared=task.DOCUMENTATION)
+class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
+    """A quadrotor flies an infinity-shaped path with a payload, drops it half-way, and flies the path once more.
+
+    ## Description
+    After section 3.5 of Dantu, *Adaptive Artificial Time Delay Control for Robotic Systems* (2023): a Q-450 frame, a
+    payload of 0.35 kg until 35 s, a fan, a low path. The vehicle moves in a physics engine; `gym.make_vec` with
+    `vectorization_mode="vector_entry_point"` gives thousands of the same in NumPy (`artde_gym.envs.quadrotor_batch`).
+
+    {shared}
+    | `engine` | "bullet" | "bullet" | physics engine |
+
+    `reset(options={{"disturbances": ..., "scenario": "Q1"}})` replaces the disturbances of this and the following
+    episodes, by a mapping or by those of a named scenario.
+
+    ## Info
+    `time_s`, `reward_terms`; at reset `disturbances` (realised values, as the grammar writes them); `events` when a
+    push or the payload begins or ends; after a crash `fall_reason`.
+
+    ## Versions
+    * v0: first version.
+
+    Raises:
+        OptionError: for an argument out of range.
+        DisturbanceError: for a malformed disturbance.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}
+
+    action_layout = task.ACTION
+    observation_layout = task.OBSERVATION
+    robot_name: ClassVar[str] = "q450"
+    tracking = task.TRACKING
+
+    def __init__(
+        self,
+        *,
+        disturbances: Mapping[str, Any] | None = None,
+        control_period: float = 0.015,
+        measurement: Measurement = "ideal",
+        duration: float = 70.0,
+        engine: EngineName = "bullet",
+        render_mode: Literal["rgb_array"] | None = None,
+    ) -> None:
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise OptionError("render_mode", render_mode, "None, 'rgb_array'")
+        self.render_mode = render_mode
+        self._disturbances = task.parse(task.DEFAULT_DISTURBANCES if disturbances is None else disturbances)
+        self._ticks = steps_per_period(control_period, GRID)
+        self.control_period = self._ticks * GRID
+        self.measurement = measurement
+        self.duration = duration
+        self._sensors = Sensors(1, measurement, self.control_period, np.float64)
+        self.nominal_robot = robot.q450()
+        self._plan = task.plan(duration, self.control_period)
+        self._last = len(self._plan) - 1
+        self.observation_space = task.OBSERVATION.box()
+        self.action_space = task.ACTION.box()
+        self._engine: Engine = make_engine(engine, self.nominal_robot, TIME_STEP)
+        self._engine.place(START, _NO_JOINTS)
+        self._placed = self._engine.snapshot()
+        self._over = True  # no step before the first reset
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
+        """Start a flight; `options` are those of the class' documentation.
+
+        Raises:
+            OptionError: for an unknown option, or a scenario that needs another environment.
+            DisturbanceError: for a malformed disturbance.
+        """
+        super().reset(seed=seed)
+        disturbances = disturbances_in(options or {}, self)
+        if disturbances is not None:
+            self._disturbances = task.parse(disturbances)
+        realised = self._disturbances.draw(self.np_random)
+        self._begin(realised, draw_keys(self.np_random, task.STREAMS))
+        return self._measure(), {"time_s": 0.0, "disturbances": realised}
+
+    def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+        """Apply a wrench for one control period.
+
+        Raises:
+            ActionError: for a wrong shape or a value that is not finite.
+            gymnasium.error.ResetNeeded: after the end of the flight, or before the first reset.
+        """
+        if self._over:
+            raise gym.error.ResetNeeded("the flight is over or has not begun: call reset()")
+        action = np.asarray(action, dtype=np.float64)
+        if action.shape != (4,):
+            raise ActionError("shape of the action", action.shape, "(4,)")
+        command = action.tolist()
+        if not math.isfinite(sum(map(abs, command))):
+            raise ActionError("action", command, "finite [u1 (N), u2, u3, u4 (Nm)]")
+        before = self._rotors.thrusts
+        events = self._simulate(command)
+        self._k += 1
+        observation = self._measure()
+        terms = self._reward_terms(before)
+        reward = self.control_period * sum(map(operator.mul, task.REWARD_SCALES.values(), terms.values()))
+        info: dict[str, Any] = {"time_s": self._k * self.control_period, "reward_terms": terms}
+        if events:
+            info["events"] = events
+        reasons = [word for word, holds in zip(task.FALL_REASONS, self._falls(), strict=True) if holds]
+        if reasons:
+            info["fall_reason"] = reasons[0]
+        truncated = self._k >= self._last
+        self._over = truncated or bool(reasons)
+        return observation, reward, bool(reasons), truncated, info
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """A picture of 640 x 480 from a camera that flies along; None without a render mode."""
+        if self.render_mode is None:
+            return None
+        return self._engine.render(Camera(self._engine.read().position, distance=1.6, pitch_deg=20.0))
+
+    def close(self) -> None:
+        self._engine.close()
+
+    def _begin(self, realised: Mapping[str, Any], keys: NDArray[np.uint64]) -> None:
+        """Set an episode up: the vehicle at rest in balance."""
+        engine = self._engine
+        engine.restore(self._placed)
+        if "initial_position" in realised:
+            engine.place(task.start(realised), _NO_JOINTS)
+        engine.scale_masses(realised.get("mass_error", {}).get("factor", 1.0))
+        self._schedule = Schedule(realised, TIME_STEP)
+        self._schedule.start(engine)
+        self._rotors = Rotors(realised, task.hover_thrusts(realised), TIME_STEP, self._ticks * STEPS)
+        self._wrench = robot.MIXER @ self._rotors.thrusts
+        self._wind = Wind(realised["wind"], keys[0]) if "wind" in realised else None
+        self._ground_effect = realised.get("ground_effect", {}).get("strength", 0.0)
+        self._sensors.begin(0, realised, keys[1:])
+        self._k = 0
+        self._over = False
+        self._read()
+
+    def _simulate(self, command: list[float]) -> list[str]:
+        """Let `command` act for one control period, with what disturbs it; returns what began or ended meanwhile."""
+        engine, events = self._engine, []
+        steps = self._ticks * STEPS
+        first = self._k * steps
+        thrusts = self._rotors.advance(command, first)
+        wrenches = thrusts @ robot.MIXER.T
+        rows = wrenches.tolist()
+        quiet = self._schedule.quiet(first, first + steps)
+        for start in range(0, steps, STEPS):
+            end = start + STEPS
+            if self._ground_effect:
+                rows[start:end] = ((thrusts[start:end] * self._gains()) @ robot.MIXER.T).tolist()
+            drag_x, drag_y, drag_z = self._drag()
+            for step in range(start, end):
+                if not quiet:
+                    events += self._schedule.apply(first + step, engine)
+                u1, u2, u3, u4 = rows[step]
+                engine.push_base((drag_x, drag_y, drag_z + u1), (u2, u3, u4), body_axes=True)
+                engine.step(_NO_JOINTS)
+            self._read()
+        self._wrench = np.add.reduce(wrenches) / steps
+        return events
+
+    def _read(self) -> None:
+        self._state = self._engine.read()
+        self._rot = _rotation(self._state.quat_xyzw)
+
+    def _drag(self) -> Vector:
+        """Force of the air until the next grid point (N), body axes."""
+        state, (xx, xy, xz, yx, yy, yz, zx, zy, zz) = self._state, self._rot
+        wx, wy, wz = _NOTHING if self._wind is None else self._wind.next(state.position)
+        vx, vy, vz = state.velocity
+        x, y, z = robot.DRAG * (wx - vx), robot.DRAG * (wy - vy), robot.DRAG * (wz - vz)
+        return xx * x + yx * y + zx * z, xy * x + yy * y + zy * z, xz * x + yz * y + zz * z
+
+    def _gains(self) -> Array:
+        """Gain of each rotor's thrust (4,) until the next grid point."""
+        heights = np.array(robot.rotor_heights(self._state.position[2], self._rot[6], self._rot[7]))
+        return thrust_gain(heights, robot.ROTOR_RADIUS, self._ground_effect, np.maximum)
+
+    def _measure(self) -> Array:
+        """The observation of the state that was read last."""
+        state, rot = self._state, self._rot
+        wx, wy, wz = state.angular_velocity
+        rates = (rot[i] * wx + rot[3 + i] * wy + rot[6 + i] * wz for i in range(3))
+        observation = np.empty(task.OBSERVATION.size)
+        observation[task.MEASURED] = (*state.position, *state.velocity, *rot, *rates)
+        plan = self._plan[self._k]
+        observation[task.REFERENCE] = plan[:-1]
+        observation[_WRENCH] = self._wrench
+        observation[_THRUST] = self._rotors.thrusts
+        observation[task.PHASE] = plan[-1]
+        self._sensors.measure(observation[:, None], np.array([self._k]))
+        return observation
+
+    def _reward_terms(self, before: Array) -> dict[str, float]:
+        plan = self._plan[self._k, :6].tolist()
+        error = math.dist(plan[:3], self._state.position) ** 2
+        velocity_error = math.dist(plan[3:], self._state.velocity) ** 2
+        thrusts = self._rotors.thrusts
+        change = thrusts - before
+        effort, smoothness = float(thrusts.dot(thrusts)), float(change.dot(change))
+        return task.reward_terms(error, velocity_error, self._rot[8], effort, smoothness, math.exp)
+
+    def _falls(self) -> tuple[bool, bool, bool]:
+        spin = math.hypot(*self._state.angular_velocity) ** 2
+        return task.falls(self._state.position, self._rot[8], spin)
+
+
+def _rotation(quat_xyzw: tuple[float, float, float, float]) -> tuple[float, ...]:
+    """The rotation matrix, row by row."""
+    x, y, z, w = quat_xyzw
+    x2, y2, z2 = x + x, y + y, z + z
+    xx, yy, zz, xy, xz, yz = x * x2, y * y2, z * z2, x * y2, x * z2, y * z2
+    wx, wy, wz = w * x2, w * y2, w * z2
+    return 1 - yy - zz, xy - wz, xz + wy, xy + wz, 1 - xx - zz, yz - wx, xz - wy, yz + wx, 1 - xx - yy

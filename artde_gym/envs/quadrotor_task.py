@@ -1,0 +1,248 @@
+"""What the single and the batched quadrotor share: layouts, reward, end of an episode, documentation."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+import numpy as np
+
+from artde_gym.arrays import Array
+from artde_gym.disturbances import Disturbances
+from artde_gym.disturbances.ground_effect import thrust_gain
+from artde_gym.disturbances.wind import GRID
+from artde_gym.layout import Field, Layout
+from artde_gym.references.infinity import START, infinity_path
+from artde_gym.robots import q450 as robot
+from artde_gym.robots.dynamics import GRAVITY
+from artde_gym.robots.spec import Vector
+from artde_gym.tracking import Effort, Fields, Tracked, Tracking
+
+STREAMS = 3  # of noise in an episode: wind, motion capture, sensor noise
+DEFAULT_DISTURBANCES: dict[str, Any] = {"payload": {"mass": 0.35, "drop": 35.0}, "wind": 1.0, "ground_effect": 1.0}
+
+VOLUME = 3.0  # m, of flight: to either side of the start, and above the ground
+TUMBLING = 30.0  # rad/s, rate of turning that is out of bounds too
+GROUND_HEIGHT = 0.1  # m, of the vehicle's origin when the skids touch the ground
+MAX_RATE = 1000.0  # rad/s, bound of observed body rates
+MAX_SPEED = 100.0  # m/s, likewise
+
+OBSERVATION = Layout(
+    (
+        Field("position", 3, "m", -10.0, 10.0, "vehicle's centre of mass without payload, world axes"),
+        Field("velocity", 3, "m/s", -MAX_SPEED, MAX_SPEED, "of that point, world axes"),
+        Field("rot_body_to_world", 9, "1", -1.01, 1.01, "rotation matrix R, row by row"),
+        Field("body_rates", 3, "rad/s", -MAX_RATE, MAX_RATE, "angular velocity, body axes"),
+        Field("position_ref", 3, "m", -5.0, 5.0, "reference at this instant"),
+        Field("velocity_ref", 3, "m/s", -5.0, 5.0, "reference velocity"),
+        Field("acceleration_ref", 3, "m/s^2", -10.0, 10.0, "reference acceleration"),
+        Field("jerk_ref", 3, "m/s^3", -50.0, 50.0, "reference jerk"),
+        Field("yaw_ref", 1, "rad", -math.pi, math.pi, "reference heading"),
+        Field("yaw_rate_ref", 1, "rad/s", -10.0, 10.0, "reference rate of heading"),
+        Field(
+            "wrench_applied",
+            4,
+            "N, Nm",
+            robot.MIN_WRENCH,
+            robot.MAX_WRENCH,
+            "mean [u1, u2, u3, u4] that the rotors really gave over the last control period",
+        ),
+        Field("rotor_thrust", 4, "N", 0.0, robot.MAX_THRUST, "thrust of each rotor at this instant"),
+        Field("phase", 1, "1", 0.0, 1.0, "time over duration"),
+    )
+)
+MEASURED = slice(0, OBSERVATION["body_rates"].stop)  # what sensors give
+REFERENCE = slice(MEASURED.stop, OBSERVATION["yaw_rate_ref"].stop)
+PHASE = OBSERVATION["phase"].start
+ACTION = Layout(
+    (
+        Field(
+            "wrench",
+            4,
+            "N, Nm",
+            robot.MIN_WRENCH,
+            robot.MAX_WRENCH,
+            "u1, thrust along body z; u2, u3, u4, torques about body x, y, z",
+        ),
+    )
+)
+
+AIR_DENSITY = 1.225  # kg/m^3
+
+
+def _heading_error(fields: Fields) -> Array:
+    """All that the observation tells of (phi, theta, psi): the other two references are the policy's own."""
+    rot = fields["rot_body_to_world"]
+    error = fields["yaw_ref"][..., 0] - np.arctan2(rot[..., 3], rot[..., 0])
+    unknown = np.full_like(error, np.nan)
+    return np.stack([unknown, unknown, (error + math.pi) % (2.0 * math.pi) - math.pi], axis=-1)
+
+
+def _induced_power(fields: Fields) -> Array:
+    """Sum of T^1.5 / sqrt(2 rho A), what ideal rotors need to hover (W)."""
+    disc, thrust = math.pi * robot.ROTOR_RADIUS**2, np.maximum(fields["rotor_thrust"], 0.0)
+    return (thrust * np.sqrt(thrust)).sum(axis=-1) / math.sqrt(2.0 * AIR_DENSITY * disc)
+
+
+TRACKING = Tracking(
+    errors=(
+        Tracked("m", 1.0, {"x": 0, "y": 1, "z": 2}, lambda fields: fields["position_ref"] - fields["position"]),
+        Tracked("deg", 180.0 / math.pi, {"phi": 0, "theta": 1, "psi": 2}, _heading_error, diagnostic="attitude_error"),
+    ),
+    norm=True,
+    band=0.02,
+    efforts=(
+        Effort("thrust", "n", "wrench_applied", slice(0, 1), {"u1": 0}),
+        Effort("torque", "nm", "wrench_applied", slice(1, 4), {"u2": 0, "u3": 1, "u4": 2}),
+    ),
+    power=_induced_power,
+    limited="rotor_thrust",
+    near=0.01,
+    tde_errors={"tde_error_rms_p": "sigma_p", "tde_error_rms_q": "sigma_q"},
+    means={"robust_gain_mean_p": "c_p", "robust_gain_mean_q": "c_q"},
+)
+"""Position and attitude, as in table 3.1 of the thesis; an error of 2 cm counts as recovered."""
+
+DOCUMENTATION = f"""\
+## Action
+`wrench`, four numbers: thrust u1 (N) along the body's z axis, and torques u2, u3, u4 (Nm) about its x, y and z axes:
+
+{ACTION.table()}
+
+They are allocated to the four rotors, each of which is limited to 0 to {robot.MAX_THRUST:g} N and follows its command
+as a first-order lag of {robot.ROTOR_LAG:g} s. Held for one control period. The bounds are what the rotors give of one
+of them at a time; beyond, they give what they can. Use Gymnasium's `RescaleAction` for [-1, 1].
+
+## Observation
+{OBSERVATION.table()}
+
+`wrench_applied` is what really acted, after limits, lag and losses of rotors, but without the gain of thrust near the
+ground: the time-delay estimate needs just that. What policies do not see: payload, wind, pushes, ground effect.
+
+## Reference
+The infinity-shaped path of `artde_gym.references.infinity`: loop 1 until 33 s, rest until 37 s, loop 2 until 70 s;
+yaw 0.
+
+## Reward
+Over a control period L, L times the sum of scale x term; each term is in `info["reward_terms"]`:
+
+| term | scale | value |
+|---|---|---|
+| `alive` | 1 | 1 |
+| `position` | 2 | exp(-\\|e\\|^2 / 0.01), e = position_ref - position in m |
+| `velocity` | 0.5 | exp(-\\|e\\|^2 / 0.05), e = velocity_ref - velocity in m/s |
+| `upright` | 0.5 | cosine of the tilt |
+| `effort` | -0.05 | mean of (rotor thrust / 8.5 N)^2 |
+| `smoothness` | -0.05 | mean of (change of rotor thrust / 8.5 N)^2 |
+
+A flight of 70 s without an error earns a little under 280.
+
+## Start
+At rest and level at the path's start, in balance with the payload and on thrusts that have settled.
+
+## End
+*Terminated* by a crash, with the reason in `info["fall_reason"]`: "ground" (the vehicle's origin lower than
+{GROUND_HEIGHT:g} m), "inverted" (tilt above 90 degrees) or "bounds" (x or y beyond {VOLUME:g} m, z above {VOLUME:g} m,
+or turning faster than {TUMBLING:g} rad/s). *Truncated* after `duration`.
+
+## Physics
+Vehicle of {robot.MASS:g} kg with linear drag of {robot.DRAG:g} N s/m against the air; see `artde_gym.robots.q450`. Wind
+and ground effect are those of `artde_gym.disturbances`; the air's force is found every {GRID:g} s and acts unchanged
+along the body's axes until the next time.
+
+## Arguments
+| name | default | allowed | meaning |
+|---|---|---|---|
+| `disturbances` | payload of 0.35 kg until 35 s, wind, ground effect | see `artde_gym.disturbances` | what happens \
+besides; `{{}}` for nothing |
+| `control_period` | 0.015 | whole multiples of {GRID:g} s up to 0.05 | time between two actions, L |
+| `measurement` | "ideal" | "ideal", "mocap" | the state itself, or what `artde_gym.disturbances.mocap` sees of it |
+| `duration` | 70.0 | from 0.1 s | length of the flight |"""
+"""What the pages of both environments share; their own arguments follow."""
+
+REWARD_SCALES: dict[str, float] = {
+    "alive": 1.0,
+    "position": 2.0,
+    "velocity": 0.5,
+    "upright": 0.5,
+    "effort": -0.05,
+    "smoothness": -0.05,
+}
+"""The reward of a control period L is L times the sum of these scales times their terms."""
+FALL_REASONS = ("ground", "inverted", "bounds")
+
+Number = TypeVar("Number", float, Array)
+Vector3 = tuple[Number, Number, Number]
+Vector4 = tuple[Number, Number, Number, Number]
+
+
+def reward_terms(
+    error: Number, velocity_error: Number, up: Number, thrust: Number, change: Number, exp: Callable[[Number], Number]
+) -> dict[str, Number]:
+    """The reward's terms in the order of `REWARD_SCALES`, elementwise.
+
+    Args:
+        error, velocity_error: squared norms of the tracking errors (m^2, m^2/s^2).
+        up: world z component of the body's z axis.
+        thrust, change: squared norms of the rotors' thrusts now and of what they changed in a control period (N^2).
+        exp: the exponential function for this kind of number.
+    """
+    return {
+        "alive": 0.0 * error + 1.0,
+        "position": exp(-100.0 * error),
+        "velocity": exp(-20.0 * velocity_error),
+        "upright": up,
+        "effort": _THRUST_SCALE * thrust,
+        "smoothness": _THRUST_SCALE * change,
+    }
+
+
+def falls(position: Vector3[Number], up: Number, spin: Number) -> tuple[Any, Any, Any]:
+    """Whether each of `FALL_REASONS` holds, elementwise; a state that is no number any more is out of bounds.
+
+    `up` is as in `reward_terms`, `spin` the squared norm of the body rates (rad^2/s^2).
+    """
+    x, y, z = position
+    inside = (abs(x) <= VOLUME) & (abs(y) <= VOLUME) & (z <= VOLUME) & (spin <= TUMBLING**2)
+    return z < GROUND_HEIGHT, up < 0.0, inside ^ True
+
+
+def parse(disturbances: Mapping[str, Any]) -> Disturbances:
+    """Read disturbances of the Q450."""
+    sites = [name for name, _, _ in robot.q450().sites]
+    return Disturbances.parse(disturbances, sites, robot.ROTORS, robot.q450().name)
+
+
+def plan(duration: float, period: float) -> Array:
+    """What the observation takes from the path, one row a control period: (samples, 15)."""
+    path = infinity_path(duration, period)
+    phase = path.period * np.arange(len(path.yaw)) / duration
+    columns = (path.yaw, path.yaw_rate, phase)
+    return np.column_stack([path.position, path.velocity, path.acceleration, path.jerk, *columns])
+
+
+def start(realised: Mapping[str, Any]) -> Vector:
+    """Where the vehicle is at the start (m)."""
+    x, y, z = map(operator.add, START, realised.get("initial_position", {}).get("offset", (0.0, 0.0, 0.0)))
+    return x, y, z
+
+
+def hover_thrusts(realised: Mapping[str, Any]) -> list[float]:
+    """Rotor thrusts (N) that balance the level vehicle at the start, with whatever it carries, as far as they can."""
+    mass = robot.MASS * realised.get("mass_error", {}).get("factor", 1.0)
+    payload = realised.get("payload")
+    moment_x = moment_y = 0.0
+    if payload is not None and payload["attach"] == 0.0 < payload["drop"]:
+        x, y, _ = payload["position"]
+        mass += payload["mass"]
+        moment_x, moment_y = payload["mass"] * GRAVITY * y, -payload["mass"] * GRAVITY * x
+    gain = 1.0
+    if "ground_effect" in realised:
+        gain = thrust_gain(start(realised)[2], robot.ROTOR_RADIUS, realised["ground_effect"]["strength"], max)
+    balance = robot.thrusts(mass * GRAVITY, moment_x, moment_y, 0.0)
+    return [min(max(thrust / gain, 0.0), robot.MAX_THRUST) for thrust in balance]
+
+
+_THRUST_SCALE = 1.0 / (len(robot.ROTORS) * robot.MAX_THRUST**2)

@@ -1,0 +1,67 @@
+"""Incremental nonlinear dynamic inversion (INDI): an increment on the force that acted, both ends equally filtered.
+
+    tau = tau_f + m_bar (u - a_f),   u = qdd_ref + Kd ed + Kp e
+    a_f, tau_f = H(s) a, H(s) tau_applied,   H(s) = w^2 / (s^2 + 2 zeta w s + w^2)
+
+a = dqd/L is the measured acceleration, tau_applied the actuators' state over the same interval. Without the filter, and
+with the nominal inertia in the place of a true one, this is time-delay estimation. Source: Smeur, Chu, de Croon,
+"Adaptive incremental nonlinear dynamic inversion for attitude control of micro air vehicles" (2016), and "Cascaded
+incremental nonlinear dynamic inversion for MAV disturbance rejection" (2018) for the position loop.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+
+from controllers.laws.second_order import FilterMemory, check_filter, second_order
+from controllers.laws.tde import TdeGains, inertia_times
+from controllers.laws.tracking import Array, Signals, desired_acceleration, errors
+
+
+@dataclasses.dataclass(frozen=True)
+class IndiGains(TdeGains):
+    """Gains of the law: m_bar is the control effectiveness' inverse, k_p and k_d as for TDE.
+
+    Attributes:
+        filter_rate: natural frequency w of the filter (rad/s).
+        filter_damping: its zeta, above 0 up to 1.
+    """
+
+    filter_rate: float
+    filter_damping: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_filter(self.filter_rate, self.filter_damping)
+
+
+class IndiMemory(NamedTuple):
+    """Velocity of the sample before (..., n), and the filters of acceleration and force."""
+
+    qd: Array
+    acceleration: FilterMemory
+    force: FilterMemory
+
+
+def indi_start(signals: Signals, period: float) -> IndiMemory:
+    """Memory before the first sample: as if the reference acceleration and the force had been there for long."""
+    rest = np.zeros_like(signals.qd)
+    return IndiMemory(
+        signals.qd - period * signals.qdd_ref,
+        FilterMemory(signals.qdd_ref, rest),
+        FilterMemory(signals.tau_applied, rest),
+    )
+
+
+def indi(gains: IndiGains, memory: IndiMemory, signals: Signals, period: float) -> tuple[Array, IndiMemory]:
+    """One sample of the law at the top."""
+    a = (signals.qd - memory.qd) / period
+    shape = gains.filter_rate, gains.filter_damping, period
+    acceleration = second_order(memory.acceleration, a, *shape)
+    force = second_order(memory.force, signals.tau_applied, *shape)
+    u = desired_acceleration(signals, *errors(signals), gains.k_p, gains.k_d)
+    tau = force.value + inertia_times(gains.m_bar, u - acceleration.value)
+    return tau, IndiMemory(signals.qd, acceleration, force)

@@ -1,0 +1,60 @@
+"""Gains of Ojas, the biped."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from controllers.laws.artde import ArtdeGains
+from controllers.laws.atde import AtdeGains
+from controllers.laws.computed_torque import ComputedTorqueGains
+from controllers.laws.tde import ConstantGains, TdeGains
+from controllers.presets.preset import Preset, Ranges
+
+_THESIS = "Dantu 2023, section 2.5.2"
+_M_BAR, _K_P, _K_D = 0.042, 25.0, 10.0
+_ALPHA, _EPS, _FLOOR = 4.0, 5e-5, 0.01
+_GAMMA = 500.0  # the thesis names no value; 200 and 500 were tried in the design, before any evaluation
+
+_TDE = TdeGains(_M_BAR, _K_P, _K_D)
+_ARTDE = ArtdeGains(
+    _M_BAR,
+    _K_P,
+    _K_D,
+    alpha=_ALPHA,
+    gamma_0=_GAMMA,
+    gamma_1=_GAMMA,
+    beta_floor=_FLOOR,
+    beta_start=_FLOOR,
+    eps=_EPS,
+)
+_CONSTANT = ConstantGains(_M_BAR, _K_P, _K_D, alpha=_ALPHA, c=0.44, eps=_EPS)
+
+OJAS: dict[tuple[str, str], Preset] = {
+    ("tde", "thesis"): Preset(_TDE, _THESIS),
+    ("atde", "thesis"): Preset(
+        AtdeGains(_M_BAR, _K_P, _K_D, alpha=_ALPHA, gamma_0=_GAMMA, c_floor=_FLOOR, c_start=_FLOOR, eps=_EPS),
+        f"{_THESIS}; gamma_0, which it does not give, is 500 as for ARTDE",
+    ),
+    ("artde", "thesis"): Preset(_ARTDE, f"{_THESIS}; gamma, which it does not give, is 500"),
+    ("artde", "robust"): Preset(
+        dataclasses.replace(_ARTDE, growth="midpoint", clamp=True, leakage=0.1, cap=1.0),
+        "ours: the thesis' gains with an unbiased growth test, a floor for each gain, leakage and a cap",
+    ),
+    ("pid", "thesis"): Preset(_TDE, f"{_THESIS}, turned into the PID gains m_bar Kd/L, m_bar Kp/L, m_bar/L"),
+    ("tde+c", "thesis"): Preset(_CONSTANT, f"{_THESIS}; c is the mean of ARTDE's over S1"),
+    ("tde+kd", "thesis"): Preset(_CONSTANT, "the slope of tde+c at s = 0 as extra stiffness and damping"),
+    ("computed-torque", "thesis"): Preset(ComputedTorqueGains(_K_P, _K_D), f"{_THESIS}, Kp and Kd"),
+}
+"""(law, preset) -> gains."""
+
+_FEEDBACK: Ranges = {"k_p": (5.0, 200.0), "k_d": (3.0, 40.0)}
+_DELAYED: Ranges = {"m_bar": (0.01, 0.08), **_FEEDBACK}
+OJAS_RANGES: dict[str, Ranges] = {
+    "tde": _DELAYED,
+    "pid": _DELAYED,
+    "atde": {**_DELAYED, "alpha": (0.5, 20.0), "gamma_0": (10.0, 5000.0)},
+    "artde": {**_DELAYED, "alpha": (0.5, 20.0), "gamma_0": (10.0, 5000.0), "gamma_1": (10.0, 5000.0)},
+    "tde+c": {**_DELAYED, "alpha": (0.5, 20.0), "c": (0.01, 10.0)},
+    "computed-torque": _FEEDBACK,
+}
+"""Law -> ranges: a decade or so about the thesis' gains."""

@@ -1,0 +1,115 @@
+"""The quadrotor's policies: laws of position and attitude in one cascade."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from controllers.law_table import LAWS, Entry
+from controllers.laws.cascade import CascadeGains, CascadeMemory, Flight, cascade, cascade_start
+from controllers.laws.tracking import Array, Memory
+from controllers.laws.vectors import Axes, joined
+from controllers.policies import Plant, Policy, flatten
+from controllers.presets import LOOPS, preset_gains
+
+AXES = 3  # of a position, and of an attitude
+
+
+class QuadrotorPolicy(Policy):
+    """A cascade of one of the laws, or of two that belong together.
+
+    Args:
+        name: of the law.
+        plant: a quadrotor's environment.
+        gains: of the cascade.
+    """
+
+    def __init__(self, name: str, plant: Plant, gains: CascadeGains) -> None:
+        (self._position, position), (self._attitude, attitude) = _LOOPS[name]
+        period = plant.control_period
+        own = {"position": position(gains.position, period), "attitude": attitude(gains.attitude, period)}
+        super().__init__(name, plant, dataclasses.replace(gains, **own))
+        self._period = period
+        self._fields = plant.observation
+
+    def read(self, observation: Array) -> Flight:
+        columns = np.ascontiguousarray(np.moveaxis(observation, -1, 0))
+        fields, last = self._fields, (*range(1, columns.ndim), 0)
+
+        def vector(name: str) -> Array:
+            return columns[fields[name]].transpose(last)
+
+        rotation, wrench = columns[fields["rot_body_to_world"]], columns[fields["wrench_applied"]]
+        x, y, z = ((rotation[i], rotation[3 + i], rotation[6 + i]) for i in range(3))
+        return Flight(
+            position=vector("position"),
+            velocity=vector("velocity"),
+            axes=(x, y, z),
+            rates=vector("body_rates"),
+            position_ref=vector("position_ref"),
+            velocity_ref=vector("velocity_ref"),
+            acceleration_ref=vector("acceleration_ref"),
+            jerk_ref=vector("jerk_ref"),
+            yaw_ref=columns[fields["yaw_ref"]][0],
+            yaw_rate_ref=columns[fields["yaw_rate_ref"]][0],
+            thrust_applied=wrench[0],
+            torque_applied=wrench[1:].transpose(last),
+        )
+
+    def start(self, signals: Flight) -> Memory:
+        return cascade_start(self._position, self._attitude, self.gains, signals, self._period)
+
+    def step(self, memory: Any, signals: Flight, observation: Array) -> tuple[Array, Memory]:
+        return cascade(self._position, self._attitude, self.gains, memory, signals, self._period)
+
+    def diagnostics(self, state: Any) -> dict[str, Array]:
+        """What the memory tells of the inside.
+
+        Of each loop what its law has (sigma, s, beta, c, ...), by name with the suffix `_p` (position) or `_q`
+        (attitude); `force_command` (..., 3), tau_p (N, world axes); `attitude_error` (..., 3), desired minus actual
+        roll, pitch and yaw (rad), each within -pi and pi.
+        """
+        memory: CascadeMemory = state
+        named = {
+            f"{name}_{suffix}": value
+            for loop, suffix in LOOPS.items()
+            for name, value in flatten(getattr(memory, loop)).items()
+        }
+        error = _roll_pitch_yaw(memory.axes_ref) - _roll_pitch_yaw(memory.axes)
+        named["attitude_error"] = np.asarray(np.remainder(error + np.pi, 2 * np.pi) - np.pi)
+        named["force_command"] = memory.force
+        return named
+
+
+def _roll_pitch_yaw(axes: Axes) -> Array:
+    """ZYX Euler angles (..., 3) (rad) of a body's axes."""
+    x, y, z = axes
+    pitch = -np.arcsin(np.minimum(np.maximum(x[2], -1.0), 1.0))
+    return joined((np.arctan2(y[2], z[2]), pitch, np.arctan2(x[1], x[0])))
+
+
+_LOOPS: dict[str, tuple[Entry, Entry]] = {
+    **{name: (LAWS[name], LAWS[name]) for name in ("tde", "atde", "artde", "tde+c", "tde+kd", "asmc", "indi")},
+    "pid": (LAWS["positional-pid"], LAWS["positional-pid"]),
+    "geometric": (LAWS["positional-pid"], LAWS["rigid-attitude"]),
+}
+"""Name -> the law of the position and the law of the attitude."""
+
+
+def make_quadrotor(env: Any, *, law: str, preset: str | None = None, **gains: Any) -> QuadrotorPolicy:
+    """The policy of a law for a quadrotor's environment, at preset gains with some replaced.
+
+    Args:
+        env: the environment that it will drive.
+        law: name of the law.
+        preset: name of its gains; None for the law's default.
+        gains: in place of the preset's; `k_p_p` is the position loop's k_p, `k_p_q` the attitude loop's.
+
+    Raises:
+        UnknownNameError: for a law that the quadrotor does not have, or an unknown preset.
+        GainError: for an unknown gain or a value that is not allowed.
+    """
+    plant = Plant.of(env)
+    return QuadrotorPolicy(law, plant, preset_gains(plant.robot, law, preset, AXES, gains))
