@@ -191,7 +191,7 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
                 if not quiet:
                     events += self._schedule.apply(first + step, engine)
                 u1, u2, u3, u4 = rows[step]
-                engine.push_base((drag_x, drag_y, drag_z + u1), (u2, u3, u4), body_axes=True)
+                engine.push_base((drag_x, drag_y, drag_z + u1), (u2, u3, u4))
                 engine.step(_NO_JOINTS)
             self._read()
         self._wrench = np.add.reduce(wrenches) / steps

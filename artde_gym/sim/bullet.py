@@ -183,17 +183,10 @@ class BulletEngine:
             )
         bullet.stepSimulation(physicsClientId=self._client)
 
-    def push_base(self, force: Vector, torque: Vector, *, body_axes: bool) -> None:
-        client = self._client
-        if body_axes:
-            # along the base's axes both act at the origin of Bullet's base frame, its centre of mass
-            bullet.applyExternalForce(self._robot, -1, force, _ORIGIN, bullet.LINK_FRAME, physicsClientId=client)
-            bullet.applyExternalTorque(self._robot, -1, torque, bullet.LINK_FRAME, physicsClientId=client)
-            return
-        center, _ = bullet.getBasePositionAndOrientation(self._robot, physicsClientId=client)
-        bullet.applyExternalForce(self._robot, -1, force, center, bullet.WORLD_FRAME, physicsClientId=client)
-        if any(torque):
-            bullet.applyExternalTorque(self._robot, -1, torque, bullet.WORLD_FRAME, physicsClientId=client)
+    def push_base(self, force: Vector, torque: Vector) -> None:
+        client = self._client  # the origin of Bullet's base frame is the base's centre of mass
+        bullet.applyExternalForce(self._robot, -1, force, _ORIGIN, bullet.LINK_FRAME, physicsClientId=client)
+        bullet.applyExternalTorque(self._robot, -1, torque, bullet.LINK_FRAME, physicsClientId=client)
 
     def push(self, site: str, force: Vector) -> None:
         for name, link, offset in self.spec.sites:
