@@ -27,6 +27,7 @@ from artde_gym.evaluation.scenarios import scenario as find_scenario
 from artde_gym.evaluation.store import write_atomically
 
 ADAPTIVE, ABLATION = "artde", "tde+kd"
+TRACED = 3  # episodes of each cell that leave their signals: to look at; compressing all takes a minute or two
 GAIN = "robust_gain_mean"  # column of a law's mean c; with a suffix for each loop of a cascade, as its gains have
 
 
@@ -123,6 +124,7 @@ def reproduce(
             out=where,
             env_kwargs={"engine": engine},
             gains=gains,
+            traced=TRACED,
             on_progress=report,
         )
 

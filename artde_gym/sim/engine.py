@@ -82,10 +82,10 @@ class Engine(Protocol):
         """Advance one `time_step` under joint torques `tau` (n,) (Nm)."""
         ...
 
-    def push_base(self, force: Vector, torque: Vector, *, body_axes: bool) -> None:
-        """Add a force (N) at the base link's centre of mass and a torque (Nm), for the next step only.
+    def push_base(self, force: Vector, torque: Vector) -> None:
+        """Add a force (N) at the base link's own centre of mass and a torque (Nm), for the next step only.
 
-        Both along the base's own axes, as they are now, or along the world's. Without the payload's mass.
+        Both along the base's axes, as they are now; a payload does not move their point of action.
         """
         ...
 

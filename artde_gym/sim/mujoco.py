@@ -103,11 +103,9 @@ class MujocoEngine:
             self._pushes[:] = 0.0
             self._pushed = False
 
-    def push_base(self, force: Vector, torque: Vector, *, body_axes: bool) -> None:
-        if body_axes:
-            quat = self._quat()
-            force, torque = rotated(force, quat), rotated(torque, quat)
-        self._pushes[self._base] += (*force, *torque)
+    def push_base(self, force: Vector, torque: Vector) -> None:
+        quat = self._quat()
+        self._pushes[self._base] += (*rotated(force, quat), *rotated(torque, quat))
         self._pushed = True
 
     def push(self, site: str, force: Vector) -> None:
