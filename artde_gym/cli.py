@@ -217,6 +217,9 @@ def reproduce(
     episodes: Annotated[int, typer.Option(help="Seeded episodes of each controller in each scenario.")] = 10,
     scenario: Annotated[str | None, typer.Option(help="Names, comma-separated. Default: all of the robot.")] = None,
     controllers: Annotated[str | None, typer.Option(help="Names, comma-separated. Default: the robot's own.")] = None,
+    ablation: Annotated[
+        bool, typer.Option(help="Run TDE at ARTDE's mean gain too; on a folder that is there, only what is new.")
+    ] = False,
     seed: Annotated[int, typer.Option(help="Seed of the whole run.")] = 0,
     workers: Annotated[int | None, typer.Option(help="Processes. Default: all cores.")] = None,
     out: Annotated[
@@ -240,6 +243,7 @@ def reproduce(
                     out / one / name,
                     scenarios=chosen,
                     controllers=None if controllers is None else _names(controllers),
+                    ablation=ablation,
                     episodes=episodes,
                     seed=seed,
                     workers=workers or os.cpu_count() or 1,

@@ -340,7 +340,11 @@ def test_the_ablation_is_as_stiff_as_artde_was_in_the_same_scenario(
 ) -> None:
     for name in ("S1", "S2"):
         monkeypatch.setitem(SCENARIOS, name, dataclasses.replace(SCENARIOS[name], kwargs=SHORT))
-    found = reproduce("biped", tmp_path, scenarios=["S1", "S2"], episodes=2)
+    without = reproduce("biped", tmp_path, scenarios=["S1", "S2"], episodes=2)
+    assert "tde+kd" not in without.result.controllers
+    assert not without.claims["claim"].str.contains("tde+kd", regex=False).any()
+    found = reproduce("biped", tmp_path, scenarios=["S1", "S2"], episodes=2, ablation=True)  # adds to what is there
+    assert found.claims["claim"].str.contains("tde+kd", regex=False).sum() == 2
     gains = {}
     for name in ("S1", "S2"):
         mean = found.result.values(name, "artde", "robust_gain_mean").mean()
@@ -352,7 +356,9 @@ def test_the_ablation_is_as_stiff_as_artde_was_in_the_same_scenario(
             found.result.values(name, "tde+kd", "rmse_deg").tobytes()
         )
     assert gains["S1"] != gains["S2"]
-    with pytest.raises(OptionError, match="beside"):
+    with pytest.raises(OptionError, match="takes its gain"):
+        reproduce("biped", tmp_path / "other", scenarios=["S1"], controllers=["tde"], ablation=True)
+    with pytest.raises(OptionError, match="ablation=True"):
         reproduce("biped", tmp_path / "other", scenarios=["S1"], controllers=["tde", "tde+kd"])
     assert not (tmp_path / "other").exists()
 
