@@ -59,6 +59,9 @@ class QuadrotorPolicy(Policy):
             columns[wrench + 1 : wrench + 4].transpose(last),
         )
 
+    def accelerated(self, signals: Flight, du: Array) -> Flight:
+        return signals._replace(acceleration_ref=signals.acceleration_ref + du)
+
     def start(self, signals: Flight) -> Memory:
         return cascade_start(self._position, self._attitude, self.gains, signals, self._period)
 
