@@ -16,21 +16,30 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from artde_gym import __version__
-from artde_gym.errors import ArtdeGymError, OptionError
+from artde_gym.errors import ArtdeGymError, OptionError, among
 from artde_gym.evaluation import SCENARIOS
 from artde_gym.evaluation import evaluate as run_evaluation
 from artde_gym.evaluation import frontier as run_frontier
 from artde_gym.evaluation.claims import CLAIMS, judge
 from artde_gym.evaluation.console import print_claims, print_result
+from artde_gym.evaluation.environments import ours
 from artde_gym.evaluation.evaluate import Update
-from artde_gym.evaluation.frontier_axis import DEFAULTS
 from artde_gym.evaluation.frontier_console import print_frontier
+from artde_gym.evaluation.frontier_standard import STANDARDS
+from artde_gym.evaluation.scenarios import scenario as find_scenario
 from artde_gym.registration import registered_controllers
 from controllers import GainError
 
-MAIN_SCENARIOS = "S1,S2,S1-L4,S2-L4"
-REPRODUCED = "S1,S2,S3,S1-L4,S2-L4,S3-L4,S1-GRF"
 WALK = "BipedWalk-Payload-v0"
+MAIN_SCENARIOS = {WALK: "S1,S2,S1-L4,S2-L4", "QuadInfinity-Payload-v0": "Q1,Q1-calm,Q1-gale"}
+"""What is run in an environment where no scenario is named."""
+REPRODUCED = {
+    "biped": ("S1,S2,S3,S1-L4,S2-L4,S3-L4,S1-GRF", "tde,atde,artde,tde+kd"),
+    "quadrotor": ("Q1,Q1-calm,Q1-gale", "tde,atde,artde,tde+kd,asmc,pid,geometric,indi"),
+}
+"""Scenarios and controllers by robot."""
+
+VARIED = dict.fromkeys(path for standard in STANDARDS.values() for path in standard.ranges)
 
 app = typer.Typer(
     add_completion=False,
@@ -53,22 +62,29 @@ def main() -> None:
 def evaluate(
     controllers: Annotated[str, typer.Option(help="Names, comma-separated; see `list`.")] = "tde,atde,artde",
     scenario: Annotated[
-        str | None, typer.Option(help=f"Names, comma-separated. Default: {MAIN_SCENARIOS}, or none with another --env.")
+        str | None, typer.Option(help="Names, comma-separated; see `list`. Default: the main ones of the environment.")
     ] = None,
-    env: Annotated[str, typer.Option(help="Environment id.")] = WALK,
+    env: Annotated[str | None, typer.Option(help=f"Environment id. Default: the scenarios', or {WALK}.")] = None,
     episodes: Annotated[int, typer.Option(help="Seeded episodes of each controller in each scenario.")] = 3,
     seed: Annotated[int, typer.Option(help="Seed of the whole evaluation.")] = 0,
     workers: Annotated[int | None, typer.Option(help="Processes. Default: all cores.")] = None,
     out: Annotated[Path | None, typer.Option(help="Results folder. Default: runs/<date and time>.")] = None,
+    backend: Annotated[
+        str, typer.Option(help="single: an engine for each episode; batch: thousands at once, where there is a vector.")
+    ] = "single",
     engine: Annotated[str | None, typer.Option(help="Physics engine.")] = None,
     disturbances: Annotated[str | None, typer.Option(help="JSON, in place of the scenario's own.")] = None,
     env_kwargs: Annotated[str | None, typer.Option(help="JSON, arguments of the environment.")] = None,
     gains: Annotated[str | None, typer.Option(help='JSON, e.g. {"artde": {"gamma_0": 200}}.')] = None,
+    traced: Annotated[
+        int | None, typer.Option(help="Episodes that leave signals. Default: all of them; none in the batch backend.")
+    ] = None,
     trace_hz: Annotated[float, typer.Option(help="Rate of stored signals; inf for all of them.")] = 100.0,
 ) -> None:
     """Compare controllers on the same seeded episodes and print them beside the thesis."""
-    default = MAIN_SCENARIOS if env == WALK else None
-    names = (scenario or default or "").split(",") if (scenario or default) else None
+    if scenario is None:
+        env = env or WALK
+        scenario = MAIN_SCENARIOS.get(env)
     kwargs = _json("--env-kwargs", env_kwargs)
     if engine is not None:
         kwargs["engine"] = engine
@@ -76,9 +92,9 @@ def evaluate(
     console = Console()
     with Display(console) as display:
         result = run_evaluation(
-            [name.strip() for name in controllers.split(",")],
+            _names(controllers),
             env,
-            scenario=names,
+            scenario=None if scenario is None else _names(scenario),
             episodes=episodes,
             seed=seed,
             workers=workers or os.cpu_count() or 1,
@@ -86,6 +102,8 @@ def evaluate(
             disturbances=_json("--disturbances", disturbances) if disturbances is not None else None,
             env_kwargs=kwargs,
             gains=_json("--gains", gains),
+            backend=backend,  # pyright: ignore[reportArgumentType]  # checked there
+            traced=traced,
             trace_hz=trace_hz,
             on_progress=display,
         )
@@ -96,7 +114,7 @@ def evaluate(
 
 @app.command()
 def frontier(
-    vary: Annotated[str, typer.Option(help=f"What to vary; with a range of its own: {', '.join(DEFAULTS)}.")],
+    vary: Annotated[str, typer.Option(help=f"What to vary; with a range of its own: {', '.join(VARIED)}.")],
     controllers: Annotated[str, typer.Option(help="Names, comma-separated; see `list`.")] = "tde,atde,artde",
     env: Annotated[str, typer.Option(help="Environment id.")] = "BipedPush-v0",
     low: Annotated[float | None, typer.Option(help="Smallest value, in the parameter's unit.")] = None,
@@ -112,6 +130,7 @@ def frontier(
     disturbances: Annotated[str | None, typer.Option(help="JSON, in place of the standard test's.")] = None,
     env_kwargs: Annotated[str | None, typer.Option(help="JSON, arguments of the environment.")] = None,
     gains: Annotated[str | None, typer.Option(help='JSON, e.g. {"artde": {"gamma_0": 200}}.')] = None,
+    backend: Annotated[str, typer.Option(help="single or batch, as for `evaluate`.")] = "single",
 ) -> None:
     """Find how much of one disturbance each controller survives; the same command continues an interrupted run."""
     kwargs = _json("--env-kwargs", env_kwargs)
@@ -120,7 +139,7 @@ def frontier(
     console = Console()
     with Display(console) as display:
         found = run_frontier(
-            [name.strip() for name in controllers.split(",")],
+            _names(controllers),
             env,
             vary,
             low=low,
@@ -135,6 +154,7 @@ def frontier(
             disturbances=_json("--disturbances", disturbances) if disturbances is not None else None,
             env_kwargs=kwargs,
             gains=_json("--gains", gains),
+            backend=backend,  # pyright: ignore[reportArgumentType]  # checked there
             on_progress=lambda value, update: display(update, f"{vary} {value:g}"),
         )
     print_frontier(found, console)
@@ -144,33 +164,42 @@ def frontier(
 
 @app.command()
 def reproduce(
+    robot: Annotated[str, typer.Option(help=f"{', '.join(REPRODUCED)}, or all.")] = "all",
     episodes: Annotated[int, typer.Option(help="Seeded episodes of each controller in each scenario.")] = 10,
-    scenario: Annotated[str, typer.Option(help="Names, comma-separated.")] = REPRODUCED,
-    controllers: Annotated[str, typer.Option(help="Names, comma-separated.")] = "tde,atde,artde,tde+kd",
+    scenario: Annotated[str | None, typer.Option(help="Names, comma-separated. Default: all of the robot.")] = None,
+    controllers: Annotated[str | None, typer.Option(help="Names, comma-separated. Default: the robot's own.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the whole run.")] = 0,
     workers: Annotated[int | None, typer.Option(help="Processes. Default: all cores.")] = None,
-    out: Annotated[Path, typer.Option(help="Results folder; the same call continues an interrupted one.")] = Path(
-        "runs/reproduce"
-    ),
+    out: Annotated[
+        Path, typer.Option(help="Results folder, with one for each robot; the same call continues an interrupted one.")
+    ] = Path("runs/reproduce"),
 ) -> None:
     """Run the thesis' scenarios and print each of its claims with a verdict, then its tables beside ours."""
+    if robot not in (*REPRODUCED, "all"):
+        raise OptionError("--robot", robot, among(robot, (*REPRODUCED, "all")))
     console = Console()
-    with Display(console) as display:
-        result = run_evaluation(
-            [name.strip() for name in controllers.split(",")],
-            scenario=[name.strip() for name in scenario.split(",")],
-            episodes=episodes,
-            seed=seed,
-            workers=workers or os.cpu_count() or 1,
-            out=out,
-            on_progress=display,
-        )
-    print_result(result, console)
-    verdicts = judge(result, [claim for claim in CLAIMS if claim.scenario in result.scenarios])
-    verdicts.to_csv(out / "claims.csv", index=False)
-    print_claims(verdicts, console)
-    if not result.complete:
-        raise typer.Exit(130)
+    for name in REPRODUCED if robot == "all" else [robot]:
+        own_scenarios, own_controllers = REPRODUCED[name]
+        environments = {find_scenario(own).env_id for own in _names(own_scenarios)}
+        chosen = [one for one in _names(scenario or own_scenarios) if find_scenario(one).env_id in environments]
+        if not chosen:
+            continue
+        with Display(console) as display:
+            result = run_evaluation(
+                _names(controllers or own_controllers),
+                scenario=chosen,
+                episodes=episodes,
+                seed=seed,
+                workers=workers or os.cpu_count() or 1,
+                out=out / name,
+                on_progress=display,
+            )
+        print_result(result, console)
+        verdicts = judge(result, [claim for claim in CLAIMS if claim.scenario in result.scenarios])
+        verdicts.to_csv(out / name / "claims.csv", index=False)
+        print_claims(verdicts, console)
+        if not result.complete:
+            raise typer.Exit(130)
 
 
 @app.command("list")
@@ -178,9 +207,8 @@ def list_() -> None:
     """Show environments, scenarios and controllers."""
     console = Console()
     environments = Table("environment", title="Environments", title_justify="left")
-    for spec in gym.registry.values():
-        if str(spec.entry_point).startswith("artde_gym."):
-            environments.add_row(spec.id)
+    for name in ours():
+        environments.add_row(name)
     scenarios = Table("scenario", "environment", "arguments", "what it is", title="Scenarios", title_justify="left")
     for entry in SCENARIOS.values():
         scenarios.add_row(entry.name, entry.env_id, json.dumps(dict(entry.kwargs)), entry.text)
@@ -205,7 +233,7 @@ class Display:
     """Live progress of an evaluation: a bar of finished episodes, and how far the running ones are."""
 
     def __init__(self, console: Console) -> None:
-        self._running: dict[tuple[str, str, int], float] = {}
+        self._running: dict[tuple[str, str, str], float] = {}
         self._what = "episodes"
         self._progress = Progress(
             TextColumn("{task.fields[what]}"),
@@ -230,14 +258,21 @@ class Display:
         if what != self._what:
             self._what = what
             self._progress.reset(self._bar)  # a bar that was full once has stopped its clock
-        key = (update.task.cell.name, update.task.controller, update.task.episode)
+        first, last = update.task.episodes[0], update.task.episodes[-1]
+        numbers = f"#{first}" if first == last else f"#{first}..{last}"
+        key = (update.task.cell.name, update.task.controller, numbers)
         self._running[key] = update.time_s
         if update.ended:
             del self._running[key]
         text = ", ".join(
-            f"{name} {controller} #{n}: {time:.0f} s" for (name, controller, n), time in self._running.items()
+            f"{name} {controller} {numbers}: {time:.0f} s"
+            for (name, controller, numbers), time in self._running.items()
         )
         self._progress.update(self._bar, completed=update.finished, total=update.total, description=text, what=what)
+
+
+def _names(text: str) -> list[str]:
+    return [name.strip() for name in text.split(",")]
 
 
 def _json(option: str, text: str | None) -> dict[str, Any]:

@@ -56,13 +56,13 @@ class Layout:
         """Views of all fields of `vector` (..., size) by name."""
         return {name: vector[..., part] for name, part in self.slices.items()}
 
-    def box(self) -> Box:
+    def box(self, dtype: type[np.floating[Any]] | np.dtype[Any] = np.float64) -> Box:
         """The space with the fields' bounds."""
         low, high = (
-            np.concatenate([np.broadcast_to(getattr(field, bound), field.size) for field in self.fields])
+            np.concatenate([np.full(field.size, getattr(field, bound), dtype) for field in self.fields])
             for bound in ("low", "high")
         )
-        return Box(low, high, dtype=np.float64)
+        return Box(low, high, dtype=dtype)
 
     def table(self) -> str:
         """The fields as a Markdown table."""

@@ -65,6 +65,7 @@ class Tracking:
         limited: field whose values saturate at its bounds.
         near: share of the field's range that counts as at the bound; a lag approaches it without reaching it.
         tde_errors: column -> diagnostic of a policy that is an error of time-delay estimation.
+        means: column -> diagnostic of a policy, one number, whose mean is reported.
         speed: observations -> speed of travel (...), m/s, where a cost of transport makes sense.
     """
 
@@ -76,6 +77,7 @@ class Tracking:
     limited: str
     near: float
     tde_errors: Mapping[str, str]
+    means: Mapping[str, str]
     speed: Callable[[Fields], Array] | None = None
 
     @property

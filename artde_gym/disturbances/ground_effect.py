@@ -1,14 +1,15 @@
 """Ground effect: a rotor close above the ground lifts more for the same power.
 
-T / T_free = 1 / (1 - (R / 4 h)^2)
+T / T_free = 1 / (1 - (R / 4 h)^2) = 1 + R^2 / (16 h^2 - R^2)
 
 with the rotor's radius R and its height h above the ground. Source: I. C. Cheeseman and W. E. Bennett, "The effect of
-the ground on a helicopter rotor in forward flight", ARC R&M 3021, 1955, in hover and for each rotor on its own. It holds
-from h = R / 2 upward; lower rotors gain what they gain there.
+the ground on a helicopter rotor in forward flight", ARC R&M 3021, 1955, in hover and for each rotor on its own. It
+holds from h = R / 2 upward; lower rotors gain what they gain there.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TypeVar
 
 from artde_gym.arrays import Array
@@ -18,10 +19,10 @@ Number = TypeVar("Number", float, Array)
 LOWEST = 0.5  # radii
 
 
-def thrust_gain(height: Number, radius: float, strength: Number) -> Number:
-    """T / T_free of a rotor of `radius` (m) at `height` (m), the gain over 1 times `strength`; elementwise."""
-    lowest = LOWEST * radius
-    height = 0.5 * (height + lowest + abs(height - lowest))  # the larger one, for numbers and arrays alike
-    ratio = radius / (4.0 * height)
-    square = ratio * ratio
-    return 1.0 + strength * (square / (1.0 - square))
+def thrust_gain(height: Number, radius: float, strength: Number, larger: Callable[..., Number]) -> Number:
+    """T / T_free of a rotor of `radius` (m) at `height` (m), what it is above 1 times `strength`; elementwise.
+
+    `larger` is the maximum for this kind of number.
+    """
+    height = larger(height, LOWEST * radius)
+    return 1.0 + strength * radius * radius / (16.0 * height * height - radius * radius)

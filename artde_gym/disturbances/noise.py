@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 from scipy.special import ndtri
 
 from artde_gym.arrays import Array
@@ -28,20 +28,24 @@ def draw_key(rng: np.random.Generator) -> int:
     return int(rng.integers(2**64, dtype=np.uint64))
 
 
-def uniform_noise(keys: Integers, index: Integers) -> Array:
-    """Four uniform numbers of mean 0 and variance 1 for each key at each index (broadcast to (n,)), (4, n).
+def uniform_noise(keys: Integers, index: Integers, dtype: DTypeLike = np.float64) -> Array:
+    """Four uniform numbers of mean 0 and variance 1 for each key at each index, (4, ...) with their broadcast shape.
 
     A filter makes them as Gaussian as normal numbers would be, and they cost far less.
     """
-    integers = _random_bits(keys, index).view(np.int16).reshape(-1, 4).T
-    return (integers + 0.5) * _TO_UNIT_VARIANCE
+    bits = _random_bits(keys, index)
+    integers = np.moveaxis(bits.view(np.int16).reshape(*bits.shape, 4), -1, 0)
+    return (integers.astype(dtype) + 0.5) * _TO_UNIT_VARIANCE
 
 
 def normal_noise(keys: Integers, index: Integers, size: int) -> Array:
-    """`size` standard normal numbers for each key at each index (broadcast to (n,)), (size, n)."""
-    numbers = index * np.uint64(size) + np.arange(size, dtype=np.uint64)[:, None]
-    bits = _random_bits(keys, numbers) >> _SHIFTS[3]
-    return ndtri((bits + 0.5) * 2.0**-53)
+    """`size` standard normal numbers for each key at each index, (size, ...) with their broadcast shape."""
+    return np.stack([ndtri(_uniform(keys, index * np.uint64(size) + np.uint64(i))) for i in range(size)])
+
+
+def _uniform(keys: Integers, index: Integers) -> Array:
+    """Uniform numbers between 0 and 1, never either."""
+    return ((_random_bits(keys, index) >> _SHIFTS[3]) + 0.5) * 2.0**-53
 
 
 def _random_bits(keys: Integers, index: Integers) -> Integers:

@@ -11,18 +11,28 @@ from artde_gym.robots.spec import Vector
 from artde_gym.sim.engine import Engine
 
 
-class _Push(NamedTuple):
+class Push(NamedTuple):
+    """A constant `force` (N, world axes) at a `site`, in time steps from `first` up to, not including, `end`."""
+
     site: str
     force: Vector
-    first: int  # physics steps: acts from `first` up to, not including, `end`
+    first: int
     end: int
+
+    @classmethod
+    def of(cls, entry: Mapping[str, Any], time_step: float) -> Push:
+        """A realised push, in steps of `time_step` (s)."""
+        direction = np.asarray(entry["direction"])
+        x, y, z = (entry["magnitude"] * direction / np.linalg.norm(direction)).tolist()
+        first = round(entry["start"] / time_step)
+        return cls(entry["body"], (x, y, z), first, first + max(1, round(entry["duration"] / time_step)))
 
 
 class Schedule:
     """The timed disturbances of one episode, in physics steps of `time_step` (s)."""
 
     def __init__(self, realised: Mapping[str, Any], time_step: float) -> None:
-        self._pushes = [_push(entry, time_step) for entry in realised.get("push", ())]
+        self._pushes = [Push.of(entry, time_step) for entry in realised.get("push", ())]
         self._payload: Mapping[str, Any] = realised.get("payload", {})
         self._changes: dict[int, list[str]] = {}
         for number, push in enumerate(self._pushes):
@@ -57,10 +67,3 @@ class Schedule:
 
     def _add(self, step: int, event: str) -> None:
         self._changes.setdefault(step, []).append(event)
-
-
-def _push(entry: Mapping[str, Any], time_step: float) -> _Push:
-    direction = np.asarray(entry["direction"])
-    x, y, z = (entry["magnitude"] * direction / np.linalg.norm(direction)).tolist()
-    first = round(entry["start"] / time_step)
-    return _Push(entry["body"], (x, y, z), first, first + max(1, round(entry["duration"] / time_step)))

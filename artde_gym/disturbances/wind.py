@@ -47,7 +47,7 @@ class Air(NamedTuple, Generic[Number]):
     axis_x: Number
     axis_y: Number
     axis_z: Number
-    narrowness: Number
+    fading: Number
     gust_keep: Number
     gust_kick: Number
 
@@ -70,7 +70,7 @@ def air(wind: Mapping[str, Any] | None) -> Air[float]:
         *(scale * wind["fan_speed"] * component for component in axis),
         *wind["fan_place"],
         *axis,
-        0.5 / wind["fan_radius"] ** 2,
+        -0.5 / wind["fan_radius"] ** 2,
         gust_keep,
         wind["turbulence"] * math.sqrt(1.0 - gust_keep**2),
     )
@@ -95,7 +95,7 @@ def velocity(
     x, y, z = position[0] - air.place_x, position[1] - air.place_y, position[2] - air.place_z
     along = x * air.axis_x + y * air.axis_y + z * air.axis_z
     radius_squared = x * x + y * y + z * z - along * along
-    jet = exp(-air.narrowness * radius_squared) * (1.0 + gust)
+    jet = exp(air.fading * radius_squared) * (1.0 + gust)
     return (
         air.steady_x + ambient[0] + jet * air.jet_x,
         air.steady_y + ambient[1] + jet * air.jet_y,
@@ -119,7 +119,7 @@ class Wind:
         velocity_now = velocity(self._air, self._ambient, self._gust, position, math.exp)
         if not self._noise:
             block = np.arange(self._read, self._read + BLOCK, dtype=np.uint64)
-            self._noise = uniform_noise(self._key, block)[:, ::-1].T.tolist()
+            self._noise = uniform_noise(self._key, block).T[::-1].tolist()  # to be read from the end
             self._read += BLOCK
         nx, ny, nz, gust = self._noise.pop()
         (x, y, z), keep, kick = self._ambient, self._air.ambient_keep, self._air.ambient_kick

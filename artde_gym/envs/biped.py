@@ -84,6 +84,7 @@ TRACKING = Tracking(
     limited="tau_applied",
     near=0.0,
     tde_errors={"tde_error_rms": "sigma"},
+    means={"robust_gain_mean": "c"},
     speed=lambda fields: fields["base_velocity"][..., 0],
 )
 

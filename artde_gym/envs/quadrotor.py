@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
-from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.ground_effect import thrust_gain
 from artde_gym.disturbances.noise import draw_key
 from artde_gym.disturbances.rotors import Rotors
@@ -21,7 +20,7 @@ from artde_gym.disturbances.wind import GRID, Wind
 from artde_gym.envs import quadrotor_task as task
 from artde_gym.envs.options import disturbances_in, steps_per_period
 from artde_gym.errors import ActionError, OptionError
-from artde_gym.references.infinity import START, infinity_path
+from artde_gym.references.infinity import START
 from artde_gym.robots import q450 as robot
 from artde_gym.robots.spec import Vector
 from artde_gym.sim.engine import Camera, Engine
@@ -131,8 +130,7 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         engine = self._engine
         engine.restore(self._placed)
         if "initial_position" in realised:
-            x, y, z = map(operator.add, START, realised["initial_position"]["offset"])
-            engine.place((x, y, z), _NO_JOINTS)
+            engine.place(task.start(realised), _NO_JOINTS)
         engine.scale_masses(realised.get("mass_error", {}).get("factor", 1.0))
         self._schedule = Schedule(realised, TIME_STEP)
         self._schedule.start(engine)
@@ -176,9 +174,9 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         velocity = _NOTHING if self._wind is None else self._wind.next(state.position)
         if not self._ground_effect:
             return velocity, None
-        row = _rotation(state.quat_xyzw)[6:]
-        heights = (state.position[2] + sum(map(operator.mul, row, place)) for place in robot.ROTOR_PLACES)
-        return velocity, [thrust_gain(height, robot.ROTOR_RADIUS, self._ground_effect) for height in heights]
+        ahead, aside, _ = _rotation(state.quat_xyzw)[6:]
+        heights = robot.rotor_heights(state.position[2], ahead, aside)
+        return velocity, [thrust_gain(height, robot.ROTOR_RADIUS, self._ground_effect, max) for height in heights]
 
     def _measure(self) -> Array:
         """Read the engine; returns the observation."""
@@ -187,11 +185,11 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         wx, wy, wz = state.angular_velocity
         rates = self._rates = tuple(rot[i] * wx + rot[3 + i] * wy + rot[6 + i] * wz for i in range(3))
         observation = np.empty(task.OBSERVATION.size)
-        observation[:18] = (*state.position, *state.velocity, *rot, *rates)
+        observation[task.MEASURED] = (*state.position, *state.velocity, *rot, *rates)
         plan = self._plan[self._k]
-        observation[18:32] = plan[:-1]
-        observation[32:40] = (*self._wrench, *self._rotors.thrusts)
-        observation[40] = plan[-1]
+        observation[task.REFERENCE] = plan[:-1]
+        observation[task.APPLIED] = (*self._wrench, *self._rotors.thrusts)
+        observation[task.PHASE] = plan[-1]
         return observation
 
     def _reward_terms(self, before: list[float]) -> dict[str, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
@@ -15,6 +16,7 @@ from artde_gym.layout import Field, Layout
 from artde_gym.references.infinity import START, infinity_path
 from artde_gym.robots import q450 as robot
 from artde_gym.robots.dynamics import GRAVITY
+from artde_gym.robots.spec import Vector
 from artde_gym.tracking import Effort, Fields, Tracked, Tracking
 
 DEFAULT_DISTURBANCES: dict[str, Any] = {"payload": {"mass": 0.35, "drop": 35.0}, "wind": 1.0, "ground_effect": 1.0}
@@ -49,6 +51,10 @@ OBSERVATION = Layout(
         Field("phase", 1, "1", 0.0, 1.0, "time over duration"),
     )
 )
+MEASURED = slice(0, OBSERVATION["body_rates"].stop)  # what sensors give
+REFERENCE = slice(MEASURED.stop, OBSERVATION["yaw_rate_ref"].stop)
+APPLIED = slice(REFERENCE.stop, OBSERVATION["rotor_thrust"].stop)
+PHASE = OBSERVATION["phase"].start
 ACTION = Layout(
     (
         Field(
@@ -94,6 +100,7 @@ TRACKING = Tracking(
     limited="rotor_thrust",
     near=0.01,
     tde_errors={"tde_error_rms_p": "sigma_p", "tde_error_rms_q": "sigma_q"},
+    means={"robust_gain_mean_p": "c_p", "robust_gain_mean_q": "c_q"},
 )
 """Position and attitude, as in table 3.1 of the thesis; an error of 2 cm counts as recovered."""
 
@@ -166,6 +173,12 @@ def plan(duration: float, period: float) -> Array:
     return np.column_stack([path.position, path.velocity, path.acceleration, path.jerk, *columns])
 
 
+def start(realised: Mapping[str, Any]) -> Vector:
+    """Where the vehicle is at the start (m)."""
+    x, y, z = map(operator.add, START, realised.get("initial_position", {}).get("offset", (0.0, 0.0, 0.0)))
+    return x, y, z
+
+
 def hover_thrusts(realised: Mapping[str, Any]) -> list[float]:
     """Rotor thrusts (N) that balance the level vehicle at the start, with whatever it carries, as far as they can."""
     mass = robot.MASS * realised.get("mass_error", {}).get("factor", 1.0)
@@ -177,7 +190,7 @@ def hover_thrusts(realised: Mapping[str, Any]) -> list[float]:
         moment_x, moment_y = payload["mass"] * GRAVITY * y, -payload["mass"] * GRAVITY * x
     gain = 1.0
     if "ground_effect" in realised:
-        gain = thrust_gain(START[2], robot.ROTOR_RADIUS, realised["ground_effect"]["strength"])
+        gain = thrust_gain(start(realised)[2], robot.ROTOR_RADIUS, realised["ground_effect"]["strength"], max)
     balance = robot.thrusts(mass * GRAVITY, moment_x, moment_y, 0.0)
     return [min(max(thrust / gain, 0.0), robot.MAX_THRUST) for thrust in balance]
 

@@ -3,28 +3,31 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from rich import box
 from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from artde_gym.arrays import Array
 from artde_gym.evaluation import statistics, thesis
+from artde_gym.evaluation.environments import tracking_of
 from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.scenarios import SCENARIOS
+from artde_gym.tracking import Tracking
 
-METRICS = {
-    "rmse_deg": "RMS error (deg)",
-    "max_abs_error_deg": "maximum absolute error (deg)",
-    "rms_torque_nm": "RMS torque (Nm)",
-}
+UNITS = {"deg": ("deg", 3), "m": ("m", 4), "nm": ("Nm", 3), "n": ("N", 3)}
+"""Unit in a column's name -> how it is written, and with how many digits."""
 REFERENCE = "artde"
 """The controller that all others are compared with, if it was evaluated: the claims are about this one."""
+ALL = "all"  # axes together
 TOGETHER = 3  # columns of controllers, or of comparisons, that fit a terminal
+ACROSS = 4  # columns of axes that do
+WIDE = 6  # columns of controllers that do with a space on either side
 
 
 def print_result(result: Result, console: Console) -> None:
@@ -32,10 +35,10 @@ def print_result(result: Result, console: Console) -> None:
     if result.episodes.empty:
         console.print("No episode was finished.")
         return
-    summary = result.summary()
+    tables = _Tables(result)
     for scenario in result.scenarios:
         console.print()
-        console.print(_scenario(result, summary, scenario))
+        console.print(tables.of(scenario))
     if not result.complete:
         console.print("\nInterrupted: the tables hold the episodes that were finished.")
     if result.folder is not None:
@@ -53,102 +56,145 @@ def print_claims(verdicts: pd.DataFrame, console: Console) -> None:
     console.print(table)
 
 
-def _scenario(result: Result, summary: pd.DataFrame, scenario: str) -> Group:
-    entry = SCENARIOS.get(scenario)
-    reference = entry.thesis if entry else None
-    title = Text(scenario if entry is None else f"{scenario}: {entry.text}", style="bold")
-    count = max(len(result.rows(scenario, controller)) for controller in result.controllers)
-    note = f"{count} seeded episode{'s' if count > 1 else ''} a controller; mean, change with its 95 % interval"
-    if reference in thesis.TABLES:
-        note += f"; thesis: {thesis.TABLES[reference]}"
-    parts: list[RenderableType] = [title, Text(note, style="dim"), _falls(result, scenario, reference)]
-    axes = [name.removeprefix("rmse_deg_") for name in result.metrics if re.fullmatch(r"rmse_deg_(?!phase)\w+", name)]
-    for metric, title in _measured(scenario).items():
-        parts += _metric(result, summary, scenario, reference, metric, title, axes)
-    return Group(*parts)
+class _Tables:
+    """All tables of a result; means and comparisons are computed once."""
 
-
-def _measured(scenario: str) -> dict[str, str]:
-    """Metrics to show and their titles: each phase by itself where the scenario has phases."""
-    entry = SCENARIOS.get(scenario)
-    if entry is None or not entry.phases:
-        return METRICS
-    shown = {}
-    for metric, title in METRICS.items():
-        for number, (start, end) in enumerate(entry.phases, start=1):
-            part = f"{start:g} to {end:g} s" if math.isfinite(end) else f"from {start:g} s"
-            shown[f"{metric}_phase{number}"] = f"{title}, {part}"
-    return shown
-
-
-def _falls(result: Result, scenario: str, reference: str | None) -> Table:
-    table = _table("controller", "falls", "rate", "95 %", "time to fall (s)", "thesis (s)", title="Falls")
-    for controller in result.controllers:
-        count, rate = result.falls(scenario, controller)
-        times = [row["time_to_fall_s"] for row in result.rows(scenario, controller).values()]
-        time = statistics.mean(times)
-        table.add_row(
-            controller,
-            f"{count}/{rate.n}",
-            _percent(rate.value),
-            f"{_percent(rate.low)}..{_percent(rate.high)}",
-            f"{time.value:.1f} {_span(time.low, time.high, digits=1)}" if time.n else "-",
-            _thesis_fall(reference, controller),
+    def __init__(self, result: Result) -> None:
+        self._result = result
+        self._controllers = result.controllers
+        self._rivals = (
+            [name for name in self._controllers if name != REFERENCE] if REFERENCE in self._controllers else []
         )
-    return table
+        self._means: dict[Any, float] = result.summary()["mean"].to_dict()
+        self._comparisons = {rival: result.compare(REFERENCE, rival).to_dict(orient="index") for rival in self._rivals}
+
+    def of(self, scenario: str) -> Group:
+        entry = SCENARIOS.get(scenario)
+        reference = entry.thesis if entry else None
+        title = Text(scenario if entry is None else f"{scenario}: {entry.text}", style="bold")
+        rows = [self._result.rows(scenario, controller) for controller in self._controllers]
+        count = max(map(len, rows))
+        note = f"{count} seeded episode{'s' if count > 1 else ''} a controller; mean, change with its 95 % interval"
+        if reference in thesis.TABLES:
+            note += f"; thesis: {thesis.TABLES[reference]}"
+        parts: list[RenderableType] = [title, Text(note, style="dim"), self._falls(scenario, reference)]
+        tracking = tracking_of(pd.concat(rows)["env"].iloc[0])
+        for metric, what, axes in _measured(tracking, () if entry is None else entry.phases):
+            parts += self._metric(scenario, reference, metric, what, axes)
+        events = [name.removeprefix("recovery_time_s_") for name in self._result.metrics if "recovery_time" in name]
+        if events:
+            parts.append(self._events(scenario, tracking, events))
+        return Group(*parts)
+
+    def _falls(self, scenario: str, reference: str | None) -> Table:
+        table = _table("controller", "falls", "rate", "95 %", "time to fall (s)", "thesis (s)", title="Falls")
+        for controller in self._controllers:
+            count, rate = self._result.falls(scenario, controller)
+            time = statistics.mean(self._result.values(scenario, controller, "time_to_fall_s"))
+            table.add_row(
+                controller,
+                f"{count}/{rate.n}",
+                _percent(rate.value),
+                f"{_percent(rate.low)}..{_percent(rate.high)}",
+                f"{time.value:.1f} {_span(time.low, time.high, digits=1)}" if time.n else "-",
+                thesis.ending(reference, controller),
+            )
+        return table
+
+    def _metric(self, scenario: str, reference: str | None, metric: str, title: str, axes: list[str]) -> list[Table]:
+        """Two rows an axis, ours and the thesis'. Few controllers and their comparisons share one table."""
+        digits = next(digits for unit, (_, digits) in UNITS.items() if unit in metric.split("_"))
+
+        def column(axis: str) -> str:
+            return metric if axis == ALL else f"{metric}_{axis}"
+
+        def table(shown: list[str], compared: list[str]) -> Table:
+            part = _table("axis", "", title=title)
+            part.collapse_padding = len(shown) > WIDE
+            for name in (*shown, *(f"{REFERENCE} vs {rival} (%)" for rival in compared)):
+                part.add_column(name, justify="right")
+            for axis in axes:
+                ours = [f"{self._means[scenario, name, column(axis)]:.{digits}f}" for name in shown]
+                ours += [_comparison(self._comparisons[rival][scenario, column(axis)]) for rival in compared]
+                theirs = [_number(thesis.value(reference, name, metric, axis), digits) for name in shown]
+                theirs += [_change(reference, metric, axis, rival) for rival in compared]
+                _add_pair(part, axis, ours, theirs)
+            return part
+
+        def comparison() -> Table:
+            """The axes side by side, where they are few."""
+            part = _table(f"{REFERENCE} vs (%)", "", title=title)
+            for axis in axes:
+                part.add_column(axis, justify="right")
+            for rival in self._rivals:
+                ours = [_comparison(self._comparisons[rival][scenario, column(axis)]) for axis in axes]
+                _add_pair(part, rival, ours, [_change(reference, metric, axis, rival) for axis in axes])
+            return part
+
+        if len(self._controllers) <= TOGETHER:
+            return [table(self._controllers, self._rivals)]
+        if len(axes) <= ACROSS:
+            return [table(self._controllers, []), *([comparison()] if self._rivals else [])]
+        pairs = [self._rivals[i : i + TOGETHER] for i in range(0, len(self._rivals), TOGETHER)]
+        return [table(self._controllers, []), *(table([], pair) for pair in pairs)]
+
+    def _events(self, scenario: str, tracking: Tracking, events: list[str]) -> Table:
+        """Peak and recovery after each disturbance; a recovery that never came counts beside the mean of the others."""
+        unit, (text, digits) = tracking.errors[0].unit, UNITS[tracking.errors[0].unit]
+        table = _table("after", "", title="after disturbances")
+        table.collapse_padding = len(self._controllers) > WIDE
+        for controller in self._controllers:
+            table.add_column(controller, justify="right")
+        for event in events:
+            peaks = [self._means[scenario, name, f"peak_error_{unit}_{event}"] for name in self._controllers]
+            if not any(map(math.isfinite, peaks)):
+                continue
+            table.add_row(event, f"peak ({text})", *(f"{peak:.{digits}f}" for peak in peaks))
+            column = f"recovery_time_s_{event}"
+            times = [self._result.values(scenario, name, column) for name in self._controllers]
+            table.add_row("", "recovery (s)", *map(_recovery, times))
+        return table
 
 
-def _thesis_fall(reference: str | None, controller: str) -> str:
-    if controller not in ("tde", "atde", "artde") or reference not in thesis.TABLES:
-        return ""
-    time = thesis.TIME_TO_FALL.get(reference, {}).get(controller)
-    return "walks" if time is None else f"falls at {time:g}"
+def _measured(tracking: Tracking, phases: Sequence[tuple[float, float]]) -> list[tuple[str, str, list[str]]]:
+    """Metrics to show, their titles and axes: each phase by itself where the scenario has phases."""
+    metrics = [
+        (f"{metric}_{tracked.unit}", f"{text} ({UNITS[tracked.unit][0]})", list(tracked.axes))
+        for metric, text in (("rmse", "RMS error"), ("max_abs_error", "maximum absolute error"))
+        for tracked in tracking.errors
+    ]
+    metrics += [
+        (f"rms_{effort.name}_{effort.unit}", f"RMS {effort.name} ({UNITS[effort.unit][0]})", list(effort.axes))
+        for effort in tracking.efforts
+    ]
+    if not phases:
+        main, *others = metrics
+        return [(*main[:2], [*main[2], ALL]), *others]
+    return [
+        (f"{metric}_phase{number}", f"{title}, {_part(*phase)}", axes)
+        for metric, title, axes in metrics
+        for number, phase in enumerate(phases, start=1)
+    ]
 
 
-def _metric(
-    result: Result,
-    summary: pd.DataFrame,
-    scenario: str,
-    reference: str | None,
-    metric: str,
-    title: str,
-    axes: list[str],
-) -> list[Table]:
-    """Two rows an axis, ours and the thesis'. Few controllers and their comparisons share one table."""
-    controllers = result.controllers
-    rivals = [name for name in controllers if name != REFERENCE] if REFERENCE in controllers else []
-    comparisons = {rival: result.compare(REFERENCE, rival).to_dict(orient="index") for rival in rivals}
-    means: dict[Any, float] = summary["mean"].to_dict()
-
-    def table(shown: list[str], compared: list[str]) -> Table:
-        part = _table("axis", "", title=title)
-        for name in (*shown, *(f"{REFERENCE} vs {rival} (%)" for rival in compared)):
-            part.add_column(name, justify="right")
-        for axis in axes:
-            column = f"{metric}_{axis}"
-            ours = [f"{means[scenario, name, column]:.3f}" for name in shown]
-            ours += [_comparison(comparisons[rival][scenario, column]) for rival in compared]
-            part.add_row(axis, "ours", *ours)
-            theirs = [_number(thesis.value(reference, name, metric, axis)) for name in shown]
-            theirs += [_change(reference, metric, axis, rival) for rival in compared]
-            if any(theirs):
-                part.add_row("", "thesis", *theirs, style="dim")
-        return part
-
-    if len(controllers) <= TOGETHER:
-        return [table(controllers, rivals)]
-    pairs = [rivals[i : i + TOGETHER] for i in range(0, len(rivals), TOGETHER)]
-    return [table(controllers, []), *(table([], pair) for pair in pairs)]
+def _part(start: float, end: float) -> str:
+    return f"{start:g} to {end:g} s" if math.isfinite(end) else f"from {start:g} s"
 
 
 def _table(*columns: str, title: str) -> Table:
     return Table(*columns, title=title, title_justify="left", title_style="italic", box=box.SIMPLE_HEAD, padding=(0, 1))
 
 
+def _add_pair(table: Table, name: str, ours: list[str], theirs: list[str]) -> None:
+    table.add_row(name, "ours", *ours)
+    if any(theirs):
+        table.add_row("", "thesis", *theirs, style="dim")
+
+
 def _comparison(row: Mapping[str, float]) -> str:
     """Relative difference of the means, with the interval of the paired difference on the same scale."""
     if row["pairs"] == 0:
-        return "no pair walked"
+        return "no pair without a fall"
     scale = row["percent"] / row["difference"] if row["difference"] else 0.0
     return f"{row['percent']:+.1f} {_span(*sorted((scale * row['low'], scale * row['high'])), digits=0)}"
 
@@ -162,8 +208,14 @@ def _span(low: float, high: float, digits: int) -> str:
     return f"({low:.{digits}f}..{high:.{digits}f})" if math.isfinite(low) else ""
 
 
-def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:.3f}"
+def _number(value: float | None, digits: int) -> str:
+    return "" if value is None else f"{value:.{digits}f}"
+
+
+def _recovery(times: Array) -> str:
+    never = int(np.isinf(times).sum())
+    mean = statistics.mean(times)
+    return (f"{mean.value:.2f}" if mean.n else "-") + (f" ({never} never)" if never else "")
 
 
 def _percent(value: float) -> str:

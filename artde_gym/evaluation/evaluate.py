@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 import hashlib
-import inspect
+import itertools
 import json
 import multiprocessing
 import os
@@ -15,14 +14,15 @@ import threading
 from collections.abc import Callable, Generator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
-import gymnasium as gym
 import numpy as np
 import pandas as pd
-from gymnasium.envs.registration import load_env_creator
 
 from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.evaluation.batch import run_batch
+from artde_gym.evaluation.environments import Backend, single, tracking_of, vector
+from artde_gym.evaluation.metrics import Span
 from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.rollout import Episode, Policy, run_episode
 from artde_gym.evaluation.scenarios import Scenario
@@ -34,7 +34,8 @@ DEFAULT_ENVIRONMENT = "BipedWalk-Payload-v0"
 CUSTOM = "custom"
 """Name of the scenario when an environment is evaluated as it is."""
 
-ENVIRONMENTS_KEPT = 4  # in a worker; each one holds a physics client
+CHUNK = 2048
+"""Episodes that run at once in the batch backend. More would be little faster; fewer would not change a result."""
 
 
 class Cell(NamedTuple):
@@ -43,23 +44,25 @@ class Cell(NamedTuple):
     name: str
     env_id: str
     kwargs: dict[str, Any]
-    phases: tuple[tuple[float, float], ...] = ()
+    phases: tuple[Span, ...] = ()
 
 
 class Task(NamedTuple):
-    """One episode of one controller."""
+    """Episodes of one controller that run at once: a single one, or a chunk. The first `traced` leave traces."""
 
+    backend: Backend
     cell: Cell
     controller: str
     policy: Policy | ControllerSpec
     gains: dict[str, Any]
-    episode: int
-    seed: int
+    episodes: list[int]
+    seeds: list[int]
     trace_hz: float
+    traced: int
 
 
 class Update(NamedTuple):
-    """Progress of an evaluation: one episode's simulated time (s), whether it has ended, and how many have."""
+    """Progress of an evaluation: one task's simulated time (s), whether it has ended, and how many episodes have."""
 
     task: Task
     time_s: float
@@ -80,6 +83,8 @@ def evaluate(
     disturbances: Mapping[str, Any] | None = None,
     env_kwargs: Mapping[str, Any] | None = None,
     gains: Mapping[str, Mapping[str, Any]] | None = None,
+    backend: Backend = "single",
+    traced: int | None = None,
     trace_hz: float = 100.0,
     on_progress: Callable[[Update], None] | None = None,
 ) -> Result:
@@ -97,8 +102,12 @@ def evaluate(
         disturbances: in place of the scenario's or the environment's own.
         env_kwargs: arguments of the environment, on top of the scenario's.
         gains: controller name -> gains in place of its preset's.
+        backend: "single" for one environment an episode; "batch" for a vector of them in chunks of `CHUNK` episodes,
+            which takes an environment with a vector form of its own. Both draw the same disturbances from a seed.
+        traced: how many episodes of each controller and scenario leave signals in the folder; None for all of them, or
+            none in the batch backend.
         trace_hz: rate of stored signals; infinite for all of them.
-        on_progress: called about once a simulated second of each running episode, and at its end.
+        on_progress: called about once a simulated second of each running episode or chunk, and at its end.
 
     Returns:
         The result; `complete` is False after an interruption (Ctrl-C), with all finished episodes in it.
@@ -115,20 +124,20 @@ def evaluate(
         raise OptionError("seed", seed, "a whole number >= 0")
     if not trace_hz > 0:
         raise OptionError("trace_hz", trace_hz, "a number > 0")
+    if backend not in get_args(Backend):
+        raise OptionError("backend", backend, among(backend, get_args(Backend)))
+    if not (traced is None or (isinstance(traced, int) and traced >= 0)):
+        raise OptionError("traced", traced, "a whole number >= 0, or None")
+    if traced is None:
+        traced = episodes if backend == "single" else 0
     named = _named(controllers)
     gains = {name: dict(values) for name, values in (gains or {}).items()}
     for name in gains:
         if name not in named:
             raise UnknownNameError("gains", name, among(name, named))
     cells = _cells(env_id, scenario, dict(env_kwargs or {}), disturbances)
-    _try_out(cells, named, gains)
+    _try_out(backend, cells, named, gains)
 
-    tasks = [
-        Task(cell, name, policy, gains.get(name, {}), episode, episode_seed(seed, episode), trace_hz)
-        for episode in range(episodes)  # outermost, so that an interruption leaves whole pairs behind
-        for cell in cells
-        for name, policy in named.items()
-    ]
     store = None
     if out is not None:
         configuration = {
@@ -137,35 +146,54 @@ def evaluate(
             "gains": gains,
             "episodes": episodes,
             "seed": seed,
+            "backend": backend,
+            "traced": traced,
             "trace_hz": trace_hz if np.isfinite(trace_hz) else "all",
         }
         store = Store(Path(out), configuration)
     rows = [] if store is None else store.rows
     done = {(row["scenario"], row["controller"], row["episode"]) for row in rows}
-    pending = [task for task in tasks if (task.cell.name, task.controller, task.episode) not in done]
-    finished = len(tasks) - len(pending)
+    tasks = [
+        Task(
+            backend,
+            cell,
+            name,
+            policy,
+            gains.get(name, {}),
+            left,
+            [episode_seed(seed, episode) for episode in left],
+            trace_hz,
+            sum(episode < traced for episode in left),
+        )
+        for chunk in _chunks(episodes, 1 if backend == "single" else CHUNK)  # outermost: whole pairs are left behind
+        for cell in cells
+        for name, policy in named.items()
+        if (left := [episode for episode in chunk if (cell.name, name, episode) not in done])
+    ]
+    total = episodes * len(cells) * len(named)
+    finished = total - sum(len(task.episodes) for task in tasks)
 
     def report(task: Task, time: float, ended: bool) -> None:
         nonlocal finished
-        finished += ended
+        finished += ended * len(task.episodes)
         if on_progress is not None:
-            on_progress(Update(task, time, ended, finished, len(tasks)))
+            on_progress(Update(task, time, ended, finished, total))
 
     complete = True
-    runs = _run_here(pending, report) if workers == 1 else _run_parallel(pending, workers, report)
+    runs = _run_here(tasks, report) if workers == 1 else _run_parallel(tasks, workers, report)
     try:
-        for task, episode in runs:
-            row = {**_labels(task), **episode.row}
+        for task, results in runs:
+            labelled = [({**_labels(task, i), **result.row}, result.traces) for i, result in enumerate(results)]
             if store is None:
-                rows.append(row)
+                rows += [row for row, _ in labelled]
             else:
-                store.add(row, episode.traces)
+                store.add(labelled)
     except KeyboardInterrupt:
         complete = False
     finally:
         runs.close()
-    order = {key: i for i, key in enumerate((task.cell.name, task.controller, task.episode) for task in tasks)}
-    rows = sorted(rows, key=lambda row: order[row["scenario"], row["controller"], row["episode"]])
+    places = {(cell.name, name): i for i, (cell, name) in enumerate(itertools.product(cells, named))}
+    rows = sorted(rows, key=lambda row: (row["episode"], places[row["scenario"], row["controller"]]))
     result = Result(pd.DataFrame(rows), None if store is None else store.folder, complete)
     if store is not None and rows:
         store.finish(rows, result.summary())
@@ -173,11 +201,19 @@ def evaluate(
 
 
 Report = Callable[[Task, float, bool], None]
+Runs = Generator[tuple[Task, list[Episode]], None, None]
 
 
 def episode_seed(seed: int, episode: int) -> int:
     """Seed of one episode: independent streams for all pairs of numbers."""
     return int(np.random.SeedSequence([seed, episode]).generate_state(1)[0])
+
+
+def _chunks(episodes: int, size: int) -> list[range]:
+    """Episodes in equal runs of at most `size`."""
+    count = -(-episodes // size)
+    edges = [episodes * i // count for i in range(count + 1)]
+    return [range(first, stop) for first, stop in itertools.pairwise(edges)]
 
 
 def _named(controllers: Any) -> dict[str, Policy | ControllerSpec]:
@@ -233,16 +269,17 @@ def _cells(
     return cells
 
 
-def _try_out(cells: list[Cell], named: Mapping[str, Any], gains: Mapping[str, dict[str, Any]]) -> None:
+def _try_out(
+    backend: Backend, cells: list[Cell], named: Mapping[str, Any], gains: Mapping[str, dict[str, Any]]
+) -> None:
     """Build everything once, so that a bad argument shows before the first episode and not in a worker."""
     for cell in cells:
         try:
-            arguments = json.dumps(cell.kwargs)
+            json.dumps(cell.kwargs)
         except TypeError as error:
             raise OptionError("env_kwargs", cell.kwargs, "values that JSON can write") from error
-        env = _environment(cell.env_id, arguments)
-        if not hasattr(env.unwrapped, "observation_layout"):
-            raise OptionError("env_id", cell.env_id, "an environment of artde_gym")
+        tracking_of(cell.env_id)
+        env = _environment(backend, cell, 1)
         for name, item in named.items():
             _policy(item, env, gains.get(name, {}))
 
@@ -254,24 +291,24 @@ def _identity(item: Policy | ControllerSpec) -> str:
     return f"{type(item).__name__} {hashlib.sha256(pickle.dumps(item)).hexdigest()}"
 
 
-def _labels(task: Task) -> dict[str, Any]:
+def _labels(task: Task, number: int) -> dict[str, Any]:
     return {
         "controller": task.controller,
         "env": task.cell.env_id,
         "scenario": task.cell.name,
-        "seed": task.seed,
-        "episode": task.episode,
+        "seed": task.seeds[number],
+        "episode": task.episodes[number],
     }
 
 
-def _run_here(tasks: list[Task], report: Report) -> Generator[tuple[Task, Episode], None, None]:
+def _run_here(tasks: list[Task], report: Report) -> Runs:
     for task in tasks:
-        episode = _run_task(task, lambda time, task=task: report(task, time, False))
-        report(task, episode.row["duration_s"], True)
-        yield task, episode
+        results = _run_task(task, lambda time, task=task: report(task, time, False))
+        report(task, _duration(results), True)
+        yield task, results
 
 
-def _run_parallel(tasks: list[Task], workers: int, report: Report) -> Generator[tuple[Task, Episode], None, None]:
+def _run_parallel(tasks: list[Task], workers: int, report: Report) -> Runs:
     context = multiprocessing.get_context("spawn")  # a fork would copy physics clients and locks
     channel, stop = context.Queue(), context.Event()
     threads = os.environ.get("OMP_NUM_THREADS")
@@ -287,9 +324,9 @@ def _run_parallel(tasks: list[Task], workers: int, report: Report) -> Generator[
                 report(tasks[index], time, False)
             for future in finished:
                 task = tasks[running.pop(future)]
-                episode = future.result()
-                report(task, episode.row["duration_s"], True)
-                yield task, episode
+                results = future.result()
+                report(task, _duration(results), True)
+                yield task, results
     finally:
         stop.set()
         pool.shutdown(wait=True, cancel_futures=True)
@@ -333,7 +370,7 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-def _run_in_worker(index: int, task: Task) -> Episode:
+def _run_in_worker(index: int, task: Task) -> list[Episode]:
     def on_progress(time: float) -> None:
         if _worker["stop"].is_set():
             raise _StoppedError
@@ -342,10 +379,23 @@ def _run_in_worker(index: int, task: Task) -> Episode:
     return _run_task(task, on_progress)
 
 
-def _run_task(task: Task, on_progress: Callable[[float], None]) -> Episode:
-    env = _environment(task.cell.env_id, json.dumps(task.cell.kwargs))
+def _run_task(task: Task, on_progress: Callable[[float], None]) -> list[Episode]:
+    env = _environment(task.backend, task.cell, len(task.seeds))
     policy = _policy(task.policy, env, task.gains)
-    return run_episode(env, policy, task.seed, trace_hz=task.trace_hz, phases=task.cell.phases, on_progress=on_progress)
+    options: dict[str, Any] = {"trace_hz": task.trace_hz, "phases": task.cell.phases, "on_progress": on_progress}
+    if task.backend == "batch":
+        return run_batch(env, policy, task.seeds, traced=task.traced, **options)
+    results = [run_episode(env, policy, seed, **options) for seed in task.seeds]
+    return [result if i < task.traced else Episode(result.row, {}) for i, result in enumerate(results)]
+
+
+def _environment(backend: Backend, cell: Cell, size: int) -> Any:
+    arguments = json.dumps(cell.kwargs)
+    return single(cell.env_id, arguments) if backend == "single" else vector(cell.env_id, arguments, size)
+
+
+def _duration(results: list[Episode]) -> float:
+    return max(result.row["duration_s"] for result in results)
 
 
 def _policy(item: Policy | ControllerSpec, env: Any, gains: dict[str, Any]) -> Policy:
@@ -355,14 +405,3 @@ def _policy(item: Policy | ControllerSpec, env: Any, gains: dict[str, Any]) -> P
     if gains:
         raise OptionError("gains", gains, "gains of registered names; a policy object has its own")
     return item
-
-
-@functools.lru_cache(maxsize=ENVIRONMENTS_KEPT)
-def _environment(env_id: str, kwargs: str) -> Any:
-    """An environment by id and JSON arguments; building one takes seconds, so a few are kept."""
-    arguments = json.loads(kwargs)
-    known = inspect.signature(load_env_creator(str(gym.spec(env_id).entry_point))).parameters
-    for name in arguments:
-        if name not in known:
-            raise OptionError(f"argument of {env_id}", name, among(name, known))
-    return gym.make(env_id, disable_env_checker=True, **arguments)

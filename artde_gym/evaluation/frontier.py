@@ -1,13 +1,11 @@
 """The robustness frontier: how much of one disturbance each controller survives.
 
-The standard test, the same for all controllers and used where no disturbances are given, is a walk of Ojas of 12 s
-under the variation of `artde_gym.evaluation.scenarios` (friction 0.7 to 0.9, payload up to 1 cm off its place) with
-
-- a payload of 1.3 kg, unless it is the payload that is varied;
-- where a push is varied, one push on the chest for 0.2 s, from any side with equal probability, at a time drawn
-  uniformly from one stride of steady walking (5 to 7 s): a robot is easier to topple in some phases of its gait than in
-  others, and nobody chooses when he is pushed;
-- where anything else is varied, the scenarios' small kick on the torso at 1 s.
+The standard test, the same for all controllers and used where no disturbances are given, is a walk of Ojas of 12 s in
+scenario S2, or a flight of the Q450 of 20 s in scenario Q1 (its payload is not dropped before the end), with what is
+varied set to its value. Where a push is varied, there is one push for 0.2 s on the chest, or the vehicle, in place of
+the scenario's own, from any side with equal probability, at a time drawn uniformly from one stride of steady walking (5
+to 7 s) or half a loop at full speed (6 to 16 s): a robot is easier to topple in some phases than in others, and nobody
+chooses when he is pushed. Where a rotor's loss is varied, it is the front left one's, from such a time on.
 
 A level counts as survived if the *observed* share of episodes without a fall is at least `survival`. The bracket holds
 the point where the observed share crosses it, for these seeds. What n episodes say about the true share is Wilson's
@@ -38,8 +36,10 @@ import pandas as pd
 
 from artde_gym.errors import OptionError, UnknownNameError, among
 from artde_gym.evaluation import statistics
+from artde_gym.evaluation.environments import Backend, arguments_of
 from artde_gym.evaluation.evaluate import CUSTOM, Update, evaluate
-from artde_gym.evaluation.frontier_axis import Axis, Harder, arguments_of, axis, standard_test
+from artde_gym.evaluation.frontier_axis import Axis, axis
+from artde_gym.evaluation.frontier_standard import Harder, standard_test
 from artde_gym.evaluation.provenance import provenance
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.evaluation.store import claim, write_atomically
@@ -96,6 +96,7 @@ def frontier(
     disturbances: Mapping[str, Any] | None = None,
     env_kwargs: Mapping[str, Any] | None = None,
     gains: Mapping[str, Mapping[str, Any]] | None = None,
+    backend: Backend = "single",
     on_progress: Callable[[float, Update], None] | None = None,
 ) -> Frontier:
     """Find by bisection the hardest value of one disturbance that each controller survives.
@@ -116,7 +117,7 @@ def frontier(
         out: folder to store everything in; the same call continues an interrupted one.
         disturbances: in place of the standard test's; the environment's own duration is then kept, too.
         env_kwargs: arguments of the environment.
-        gains: as for `evaluate`.
+        gains: as for `evaluate`, also `backend`.
         on_progress: called with the value of the running level and the progress of its episodes.
 
     Returns:
@@ -134,9 +135,9 @@ def frontier(
         if name not in named:
             raise UnknownNameError("gains", name, among(name, named))
     varied = axis(env_id, vary, low, high, tolerance, harder)
-    arguments = _arguments(env_id, varied, env_kwargs or {})
+    arguments = _arguments(env_id, backend, varied, env_kwargs or {})
     if disturbances is None:
-        disturbances, arguments = standard_test(env_id, varied, arguments)
+        disturbances, arguments = standard_test(env_id, varied.path, arguments)
     if not isinstance(disturbances, Mapping):
         raise OptionError("disturbances", disturbances, "a mapping of kinds to their parameters")
     grid = varied.levels
@@ -155,6 +156,7 @@ def frontier(
         "disturbances": disturbances,
         "env_kwargs": arguments,
         "gains": gains,
+        "backend": backend,
     }
     folder = None if out is None else _Folder(Path(out), configuration)
     rows: list[dict[str, Any]] = []
@@ -177,6 +179,7 @@ def frontier(
             disturbances=here,
             env_kwargs=kwargs,
             gains={name: gains[name] for name in names if name in gains},
+            backend=backend,
             trace_hz=TRACE_HZ,
             on_progress=report,
         )
@@ -315,8 +318,8 @@ def _named(controllers: Any) -> dict[str, str | Policy]:
     return named
 
 
-def _arguments(env_id: str, varied: Axis, given: Mapping[str, Any]) -> dict[str, Any]:
-    known = arguments_of(env_id)
+def _arguments(env_id: str, backend: Backend, varied: Axis, given: Mapping[str, Any]) -> dict[str, Any]:
+    known = arguments_of(env_id, backend)
     for name in given:
         if name not in known:
             raise OptionError(f"argument of {env_id}", name, among(name, known))

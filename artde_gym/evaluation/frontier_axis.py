@@ -1,71 +1,21 @@
-"""What a frontier varies: a path to one number, its range and its grid, and the standard test around it."""
+"""What a frontier varies: a path to one number, its range and its grid."""
 
 from __future__ import annotations
 
-import copy
 import dataclasses
-import inspect
 import math
 from collections.abc import Mapping
-from typing import Any, Literal, NamedTuple
-
-import gymnasium as gym
-from gymnasium.envs.registration import load_env_creator
+from typing import Any
 
 from artde_gym.disturbances import KINDS
 from artde_gym.errors import OptionError, UnknownNameError, among
-from artde_gym.evaluation.scenarios import SCENARIOS
-
-Harder = Literal["larger", "smaller"]
+from artde_gym.evaluation.environments import arguments_of, robot_of
+from artde_gym.evaluation.frontier_standard import Harder, standard_for
 
 FINEST = 1e-6  # tolerance relative to the ends; finer steps would drown in the digits of a level's name
-MILLISECOND = 1e-3  # s; a control period is a whole number of them
 
-
-class Default(NamedTuple):
-    """Range and grid of a path where the user gives none, and which of its ends is the hard one."""
-
-    low: float
-    high: float
-    tolerance: float
-    harder: Harder = "larger"
-
-
-DEFAULTS: dict[str, Default] = {
-    "push.magnitude": Default(0.0, 60.0, 2.0),
-    "payload.mass": Default(0.5, 5.0, 0.25),
-    "grf_pulse.magnitude": Default(0.0, 200.0, 10.0),
-    "friction.coefficient": Default(0.05, 0.8, 0.05, "smaller"),
-    "slope.pitch_deg": Default(0.0, 10.0, 0.5),
-    "slope.roll_deg": Default(0.0, 10.0, 0.5),
-    "sensor_noise.position": Default(0.0, 0.01, 0.00025),
-    "sensor_noise.velocity": Default(0.0, 1.0, 0.025),
-    "encoder_bits.bits": Default(8.0, 20.0, 1.0, "smaller"),
-    "torque_delay.samples": Default(0.0, 10.0, 1.0),
-    "motor_lag.time_constant": Default(0.0, 0.02, 0.001),
-    "actuator_loss.factor": Default(0.0, 1.0, 0.05, "smaller"),
-    "mass_error.factor": Default(1.0, 2.0, 0.05),
-    "control_period": Default(0.001, 0.02, 0.001),
-    "speed": Default(0.0, 0.25, 0.01),
-}
-"""Path -> range. Any other path needs low, high and tolerance."""
 
 ARGUMENT_UNITS = {"control_period": "s", "speed": "m/s", "step_duration": "s", "duration": "s"}
-
-DURATION = 12.0  # s, of the standard test's walk
-STRIDE = (5.0, 7.0)  # s, two steps of steady walking at 1 s a step
-PUSH: dict[str, Any] = {
-    "body": "chest",
-    "magnitude": 0.0,
-    "direction": [{"normal": [0.0, 1.0]}, {"normal": [0.0, 1.0]}, 0.0],
-    "start": {"uniform": list(STRIDE)},
-    "duration": 0.2,
-}
-_REPEATED: dict[str, list[dict[str, Any]]] = {
-    "push": [PUSH],
-    "actuator_loss": [{"joint": "all"}],
-    "initial_pose": [{"joint": "all"}],
-}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -143,7 +93,8 @@ def axis(
         OptionError: for a range that is missing, empty, off the grid of whole numbers, or not allowed.
     """
     kind, name, unit = _find(env_id, path)
-    default = DEFAULTS.get(path)
+    standard = standard_for(env_id)
+    default = None if standard is None else standard.ranges.get(path)
     ends: dict[str, float] = {}
     for field, given in (("low", low), ("high", high), ("tolerance", tolerance)):
         value = given if given is not None or default is None else getattr(default, field)
@@ -155,43 +106,16 @@ def axis(
     if harder not in (None, "larger", "smaller"):
         raise OptionError("harder", harder, "'larger', 'smaller'")
     chosen = Axis(kind, name, unit, **ends, harder=harder or (default.harder if default else "larger"))
-    _check(chosen)
+    _check(chosen, None if standard is None else standard.time_step)
     return chosen
 
 
-def arguments_of(env_id: str) -> Mapping[str, inspect.Parameter]:
-    """Arguments of an environment by name.
-
-    Raises:
-        gymnasium.error.Error: if there is no such environment.
-    """
-    return inspect.signature(load_env_creator(str(gym.spec(env_id).entry_point))).parameters
-
-
-def standard_test(env_id: str, varied: Axis, arguments: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Disturbances and arguments of the standard test; see `artde_gym.evaluation.frontier`.
-
-    Raises:
-        OptionError: if the environment has no standard test, or the walk ends before the push.
-    """
-    if not env_id.startswith("Biped"):
-        raise OptionError("disturbances", None, f"a mapping: {env_id} has no standard test")
-    arguments = dict(arguments) if varied.path == "duration" else {"duration": DURATION, **arguments}
-    disturbances: dict[str, Any] = copy.deepcopy(dict(SCENARIOS["S2"].disturbances))
-    if varied.kind in _REPEATED:
-        disturbances[varied.kind] = copy.deepcopy(_REPEATED[varied.kind])
-    duration = arguments.get("duration", DURATION)
-    if varied.kind == "push" and isinstance(duration, (int, float)) and duration < STRIDE[1] + 1.0:
-        raise OptionError(
-            "duration", duration, f"at least {STRIDE[1] + 1:g} s, as the push comes until {STRIDE[1]:g} s"
-        )
-    return disturbances, arguments
-
-
 def _find(env_id: str, path: str) -> tuple[str | None, str, str]:
+    robot = robot_of(env_id)
     disturbances = {
         f"{kind.name}.{parameter.name}": (kind.name, parameter.name, parameter.unit)
         for kind in KINDS.values()
+        if robot in kind.robots
         for parameter in kind.parameters
         if parameter.size == 1
     }
@@ -207,14 +131,14 @@ def _find(env_id: str, path: str) -> tuple[str | None, str, str]:
     raise UnknownNameError("vary", path, among(path, [*disturbances, *numbers]))
 
 
-def _check(varied: Axis) -> None:
+def _check(varied: Axis, time_step: float | None) -> None:
     if varied.low >= varied.high:
         raise OptionError("low", varied.low, f"below high, which is {varied.high:g}")
     span = varied.high - varied.low
     finest = FINEST * max(abs(varied.low), abs(varied.high))
     if not finest <= varied.tolerance <= span * (1 + FINEST):  # 0.3 - 0.2 is less than 0.1
         raise OptionError("tolerance", varied.tolerance, f"{finest:g} to high - low, which is {span:g}")
-    quantum = MILLISECOND if varied.path == "control_period" else None
+    quantum = time_step if varied.path == "control_period" else None
     if varied.kind is not None:
         (parameter,) = (p for p in KINDS[varied.kind].parameters if p.name == varied.name)
         for field, value in (("low", varied.low), ("high", varied.high)):

@@ -12,6 +12,7 @@ Per axis: `rmse_u_<axis>`, `max_abs_error_u_<axis>`, and for each effort `rms_<e
 - `saturation`: share of samples with an actuator at its limit.
 - `energy_j`: integral of the power; `cost_of_transport`: energy / (m g distance), NaN below 0.1 m.
 - `tde_error_rms`, ...: root mean square of the error of time-delay estimation (rad/s^2, m/s^2).
+- `robust_gain_mean`, ...: mean of the law's robust gain c.
 - `peak_error_u_<event>`: largest size of the main error from the beginning of a push, or the payload's drop, until 2 s
   after its end.
 - `recovery_time_s_<event>`: time from the end of each push, or the drop, until the size of the main error stays for 1 s
@@ -88,27 +89,27 @@ class Metrics:
         self._errors = {prefix: [_Squares(n) for _ in tracking.errors] for prefix in spans}
         self._efforts = {prefix: [_Squares(n) for _ in tracking.efforts] for prefix in spans}
         self._size, self._sigmas = _Squares(n), {column: _Squares(n) for column in tracking.tde_errors}
+        self._means = {column: _Mean(n) for column in tracking.means}
         self._variations = [_Variation(n) for _ in tracking.efforts]
         self._iae, self._itae, self._saturated, self._energy, self._distance = np.zeros((5, n))
         names = dict.fromkeys(name for one in events for name in one)
         never = (np.inf, np.inf)
         self._events = {name: _Event([one.get(name, never) for one in events], tracking.band, period) for name in names}
-        self._start = 0  # index of the sample to come
         self._count = np.zeros(n, dtype=np.int64)  # samples of each episode so far
 
-    def add(self, fields: Fields, diagnostics: Fields | None, live: Mask | None = None) -> None:
-        """Take in a block of samples.
+    def add(self, start: int, fields: Fields, diagnostics: Fields | None, live: Mask | None = None) -> None:
+        """Take in a block of samples; those of an episode come once each, in order.
 
         Args:
+            start: which sample the first one is; the first of an episode is 0.
             fields: observations by name, (samples, n, size).
             diagnostics: of the policy at these samples, (samples, n, ...), or at some of them if no error is taken from
                 there; None where the policy had nothing to decide any more.
-            live: (n,), which episodes have not ended before this block; None if none has.
+            live: (n,), the episodes whose samples these are; None for all.
         """
         tracking = self._tracking
         live = None if live is None or live.all() else live
-        start, samples = self._start, len(fields[tracking.limited])
-        self._start += samples
+        samples = len(fields[tracking.limited])
         self._count += samples if live is None else samples * live
         for number, tracked in enumerate(tracking.errors):
             error = _error(tracked, fields, diagnostics)
@@ -133,6 +134,9 @@ class Metrics:
         for column, name in tracking.tde_errors.items():
             if diagnostics is not None and name in diagnostics:
                 self._sigmas[column].add(diagnostics[name], live)
+        for column, name in tracking.means.items():
+            if diagnostics is not None and name in diagnostics:
+                self._means[column].add(diagnostics[name], live)
 
     def _add_main(self, error: Array, start: int, live: Mask | None) -> None:
         size = np.sqrt(np.square(error).sum(axis=-1) if self._tracking.norm else np.square(error).mean(axis=-1))
@@ -173,6 +177,7 @@ class Metrics:
             far = np.where(period * self._distance > NEAR, period * self._distance, np.nan)
             columns["cost_of_transport"] = energy / (self._masses * GRAVITY * far)
         columns |= {column: squares.rms_of_all for column, squares in self._sigmas.items()}
+        columns |= {column: mean.value for column, mean in self._means.items()}
         return [
             dict(zip(columns, row, strict=True))
             for row in zip(*(values.tolist() for values in columns.values()), strict=True)
@@ -204,6 +209,22 @@ class _Squares:
         return np.sqrt(self._sums.mean(axis=-1) / _or_nan(self._number))
 
 
+class _Mean:
+    """Means of numbers in n episodes."""
+
+    def __init__(self, n: int) -> None:
+        self._sums, self._number = np.zeros(n), np.zeros(n, dtype=np.int64)
+
+    def add(self, values: Array, live: Mask | None) -> None:
+        """Take in (samples, n)."""
+        self._sums += _sum(values, live)
+        self._number += len(values) if live is None else len(values) * live
+
+    @property
+    def value(self) -> Array:
+        return self._sums / _or_nan(self._number)
+
+
 class _Variation:
     """Total variation of vectors in n episodes, mean over their components."""
 
@@ -216,7 +237,8 @@ class _Variation:
         if len(values):
             joined = values if self._last is None else np.concatenate([self._last, values])
             self.total += _sum(np.abs(np.diff(joined, axis=0)).mean(axis=-1), live)
-            self._last = values[-1:]
+            last = values[-1:]
+            self._last = last if live is None or self._last is None else np.where(live[:, None], last, self._last)
 
 
 class _Event:
@@ -276,13 +298,13 @@ def _part(first: int, stop: int, start: int) -> slice:
 
 
 def _sum(values: Array | Mask, live: Mask | None) -> Array:
-    """Sum over a block's samples (samples, n, ...); zero in episodes that are over."""
+    """Sum over a block's samples (samples, n, ...); zero in other episodes."""
     total = values.sum(axis=0)
     return total if live is None else np.where(_beside(live, total), total, 0)
 
 
 def _largest(values: Array, live: Mask | None) -> Array:
-    """Largest of a block's samples (samples, n, ...); NaN in episodes that are over."""
+    """Largest of a block's samples (samples, n, ...); NaN in other episodes."""
     largest = np.fmax.reduce(values, axis=0, initial=np.nan)
     return largest if live is None else np.where(_beside(live, largest), largest, np.nan)
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from artde_gym.arrays import Array
 from artde_gym.errors import UnknownNameError, among
 from artde_gym.evaluation import statistics
 
@@ -45,17 +45,20 @@ class Result:
         numbers = self.episodes.select_dtypes("number").columns
         return [name for name in numbers if name not in _NOT_METRICS and not name.startswith("disturbance.")]
 
-    def rows(self, scenario: str, controller: str) -> dict[int, dict[str, Any]]:
-        """The episodes of one controller in one scenario, by their number."""
+    def rows(self, scenario: str, controller: str) -> pd.DataFrame:
+        """The episodes of one controller in one scenario, indexed by their number."""
         chosen = (self.episodes["scenario"] == scenario) & (self.episodes["controller"] == controller)
         frame: pd.DataFrame = self.episodes.loc[chosen]
-        records: list[dict[Any, Any]] = frame.to_dict(orient="records")
-        return {record["episode"]: record for record in records}
+        return frame.set_index("episode")
+
+    def values(self, scenario: str, controller: str, metric: str) -> Array:
+        """A metric over the episodes of one controller in one scenario."""
+        return self.rows(scenario, controller)[metric].to_numpy(dtype=np.float64)
 
     def falls(self, scenario: str, controller: str) -> tuple[int, statistics.Estimate]:
         """Number of falls, and their rate with Wilson's interval."""
-        fell = [bool(row["fell"]) for row in self.rows(scenario, controller).values()]
-        return sum(fell), statistics.rate(sum(fell), len(fell))
+        fell = self.rows(scenario, controller)["fell"].to_numpy(dtype=np.bool_)
+        return int(fell.sum()), statistics.rate(int(fell.sum()), len(fell))
 
     def summary(self) -> pd.DataFrame:
         """Mean, 95 % interval and number of episodes, indexed by scenario, controller and metric.
@@ -66,12 +69,16 @@ class Result:
         lines = []
         for scenario in self.scenarios:
             for controller in self.controllers:
-                rows = self.rows(scenario, controller).values()
+                rows = self.rows(scenario, controller)
                 estimates = {"fall_rate": self.falls(scenario, controller)[1]}
-                estimates.update({metric: statistics.mean([row[metric] for row in rows]) for metric in self.metrics})
+                estimates.update({metric: statistics.mean(rows[metric]) for metric in self.metrics})
                 lines += [(scenario, controller, metric, *estimate) for metric, estimate in estimates.items()]
         columns = ["scenario", "controller", "metric", "mean", "low", "high", "n"]
         return pd.DataFrame(lines, columns=columns).set_index(columns[:3])
+
+    def pairs(self, scenario: str, first: str, second: str, metric: str) -> tuple[Array, Array]:
+        """The metric's finite values of two controllers on the same seeds; see `compare` for which seeds."""
+        return _pairs(self.rows(scenario, first), self.rows(scenario, second), metric)
 
     def compare(self, first: str, second: str) -> pd.DataFrame:
         """Paired differences first - second on the same seeds, indexed by scenario and metric.
@@ -88,13 +95,9 @@ class Result:
                 raise UnknownNameError("controller", name, among(name, self.controllers))
         lines = []
         for scenario in self.scenarios:
-            mine, theirs = self.rows(scenario, first), self.rows(scenario, second)
-            pairs = [(mine[episode], theirs[episode]) for episode in mine if episode in theirs]
-            walked = [pair for pair in pairs if not (pair[0]["fell"] or pair[1]["fell"])]
+            mine, theirs = (self.rows(scenario, name) for name in (first, second))
             for metric in ("fell", *self.metrics):
-                used = pairs if metric in _OF_ALL else walked
-                values = np.array([[a[metric], b[metric]] for a, b in used], dtype=np.float64).reshape(-1, 2)
-                a, b = values[np.isfinite(values).all(axis=1)].T
+                a, b = _pairs(mine, theirs, metric)
                 difference = statistics.mean(a - b)
                 mean_a, mean_b = (float(side.mean()) if len(side) else np.nan for side in (a, b))
                 percent = 100 * difference.value / mean_b if mean_b else np.nan
@@ -103,3 +106,13 @@ class Result:
         columns = ["scenario", "metric", first, second, "difference", "low", "high"]
         columns += ["percent", "win_probability", "pairs"]
         return pd.DataFrame(lines, columns=columns).set_index(["scenario", "metric"])
+
+
+def _pairs(mine: pd.DataFrame, theirs: pd.DataFrame, metric: str) -> tuple[Array, Array]:
+    both = mine.index.intersection(theirs.index)
+    mine, theirs = mine.loc[both], theirs.loc[both]
+    a, b = (rows[metric].to_numpy(dtype=np.float64) for rows in (mine, theirs))
+    used = np.isfinite(a) & np.isfinite(b)
+    if metric not in _OF_ALL:
+        used &= ~(mine["fell"] | theirs["fell"]).to_numpy(dtype=np.bool_)
+    return a[used], b[used]

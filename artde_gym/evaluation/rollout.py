@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from artde_gym.evaluation.metrics import Metrics, events_of
+from artde_gym.evaluation.metrics import Metrics, Span, events_of
 
 Array = NDArray[Any]
 
@@ -37,7 +37,7 @@ def run_episode(
     *,
     options: dict[str, Any] | None = None,
     trace_hz: float = 100.0,
-    phases: tuple[tuple[float, float], ...] = (),
+    phases: Sequence[Span] = (),
     on_progress: Callable[[float], None] | None = None,
 ) -> Episode:
     """Drive `env` with `policy` from a seeded reset to the end.
@@ -76,40 +76,56 @@ def run_episode(
             on_progress(info["time_s"])
 
     fields = plant.observation_layout.split(np.array(observations))
-    inside = _stack(diagnostics)
-    metrics = Metrics(
-        plant.tracking, plant.observation_layout, period, [mass(plant, disturbances)], [events_of(disturbances)], phases
-    )
-    metrics.add(_one(fields, slice(None, -1)), _one(inside, slice(None)))
-    metrics.add(_one(fields, slice(-1, None)), None)  # nothing was decided there any more
-    row = {
-        "fell": bool(terminated),
-        "fall_reason": info.get("fall_reason", ""),
-        "time_to_fall_s": info["time_s"] if terminated else float("nan"),
-        "duration_s": info["time_s"],
-        "reward": total,
-        **metrics.rows()[0],
+    inside = stack(diagnostics)
+    metrics = metrics_for(plant, [disturbances], phases)
+    last = len(observations) - 1
+    metrics.add(0, _part(fields, np.s_[:last, None]), _part(inside, np.s_[:, None]))
+    metrics.add(last, _part(fields, np.s_[last:, None]), None)  # nothing was decided there any more
+    reason = info.get("fall_reason", "") if terminated else None
+    row = row_of(reason, info["time_s"], total, metrics.rows()[0], disturbances)
+    kept = slice(None, None, stride // diagnosed_every)
+    return Episode(row, traces_of(stride * period, _part(fields, slice(None, None, stride)), _part(inside, kept)))
+
+
+def metrics_for(plant: Any, disturbances: Sequence[Mapping[str, Any]], phases: Sequence[Span]) -> Metrics:
+    """Metrics of episodes in an environment, from the realised disturbances of each."""
+    masses = [plant.nominal_robot.mass + one.get("payload", {}).get("mass", 0.0) for one in disturbances]
+    events = [events_of(one) for one in disturbances]
+    return Metrics(plant.tracking, plant.observation_layout, plant.control_period, masses, events, phases)
+
+
+def row_of(
+    fall_reason: str | None, time_s: float, reward: float, metrics: dict[str, Any], disturbances: dict[str, Any]
+) -> dict[str, Any]:
+    """One episode's row; `fall_reason` is None without a fall."""
+    fell = fall_reason is not None
+    return {
+        "fell": fell,
+        "fall_reason": fall_reason or "",
+        "time_to_fall_s": time_s if fell else float("nan"),
+        "duration_s": time_s,
+        "reward": reward,
+        **metrics,
         **_flatten(disturbances),
     }
-    traces = {"time": period * np.arange(0, len(observations), stride)}
-    traces.update({name: values[::stride].astype(np.float32) for name, values in fields.items()})
-    kept = slice(None, None, stride // diagnosed_every)
-    traces.update({f"policy.{name}": values[kept].astype(np.float32) for name, values in inside.items()})
-    return Episode(row, traces)
 
 
-def mass(plant: Any, disturbances: Mapping[str, Any]) -> float:
-    """Of the robot with its payload (kg)."""
-    return plant.nominal_robot.mass + disturbances.get("payload", {}).get("mass", 0.0)
+def traces_of(period: float, fields: dict[str, Array], inside: dict[str, Array]) -> dict[str, Array]:
+    """Signals of one episode, sampled every `period` (s): observations and the policy's diagnostics."""
+    return {
+        "time": period * np.arange(len(next(iter(fields.values())))),
+        **{name: values.astype(np.float32) for name, values in fields.items()},
+        **{f"policy.{name}": values.astype(np.float32) for name, values in inside.items()},
+    }
 
 
-def _one(signals: dict[str, Array], part: slice) -> dict[str, Array]:
-    """Samples of one episode as those of one of many."""
-    return {name: values[part, None] for name, values in signals.items()}
-
-
-def _stack(samples: list[dict[str, Array]]) -> dict[str, Array]:
+def stack(samples: list[dict[str, Array]]) -> dict[str, Array]:
+    """Samples of named arrays as named arrays of samples."""
     return {name: np.array([sample[name] for sample in samples]) for name in samples[0]} if samples else {}
+
+
+def _part(signals: dict[str, Array], part: Any) -> dict[str, Array]:
+    return {name: values[part] for name, values in signals.items()}
 
 
 def _flatten(disturbances: dict[str, Any]) -> dict[str, Any]:

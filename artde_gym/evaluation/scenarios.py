@@ -1,7 +1,9 @@
 """Named scenarios: an environment, its arguments and what happens in it, fixed on physical grounds.
 
-Every biped scenario varies from seed to seed, so that a result is a rate and not a single trajectory: a kick on the
+Every scenario varies from seed to seed, so that a result is a rate and not a single trajectory. Biped: a kick on the
 torso of 0.5 to 5 N for 0.2 s at 1 s from any side, friction of 0.7 to 0.9, and a payload up to 1 cm off its place.
+Quadrotor: the air, a payload within 5 % of its mass and 5 mm of its place (as it is weighed and gripped), and a start
+within 5 mm of the path (as a vehicle hovers there).
 """
 
 from __future__ import annotations
@@ -46,8 +48,20 @@ class Scenario:
     phases: tuple[tuple[float, float], ...] = ()
 
 
+_LOAD: dict[str, Any] = {
+    "mass": {"uniform": [0.95 * 0.35, 1.05 * 0.35]},
+    "position": [{"uniform": [0.005, 0.015]}, {"uniform": [-0.005, 0.005]}, {"uniform": [-0.105, -0.095]}],
+    "drop": 35.0,
+}
+_FLIGHT: dict[str, Any] = {
+    "payload": _LOAD,
+    "ground_effect": 1.0,
+    "initial_position": {"offset": [{"uniform": [-0.005, 0.005]}] * 3},
+}
+
 _WALK = "BipedWalk-Payload-v0"
 _PUSH = "BipedPush-v0"
+_INFINITY = "QuadInfinity-Payload-v0"
 _SLOW = {"control_period": 0.004}
 _S2 = {"payload": _PAYLOAD, **_VARIATION}
 _S3 = {**_S2, "push": [_KICK, CHEST_PUSH, ARM_PUSH]}
@@ -64,6 +78,9 @@ SCENARIOS: dict[str, Scenario] = {
         Scenario("S2-L4", _WALK, _SLOW, _S2, "S2 at L = 4 ms", "S2"),
         Scenario("S3-L4", _PUSH, _SLOW, _S3, "S3 at L = 4 ms", "S3", _PHASES),
         Scenario("S1-GRF", _WALK, {}, _GRF, "S1 with the thesis' extra ground force", "S1"),
+        Scenario("Q1", _INFINITY, {}, {**_FLIGHT, "wind": 1.0}, "infinity loops with a payload of 0.35 kg, wind", "Q1"),
+        Scenario("Q1-calm", _INFINITY, {}, _FLIGHT, "Q1 without wind"),
+        Scenario("Q1-gale", _INFINITY, {}, {**_FLIGHT, "wind": 2.0}, "Q1 in wind of twice the strength", "Q1"),
     )
 }
 

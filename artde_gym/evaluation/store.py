@@ -16,7 +16,7 @@ import io
 import json
 import os
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -45,13 +45,15 @@ class Store:
         self.rows = self._read_rows()
         self._columns = list(self.rows[0]) if self.rows else []
 
-    def add(self, row: Mapping[str, Any], traces: Mapping[str, NDArray[Any]]) -> None:
-        """Keep one finished episode; its row is written last, so that a row always has its traces."""
-        self.save_traces(row, traces)
-        self.rows.append(dict(row))
-        if set(row) == set(self._columns):
+    def add(self, episodes: Sequence[tuple[Mapping[str, Any], Mapping[str, NDArray[Any]]]]) -> None:
+        """Keep finished episodes, each a row and traces; rows are written last, so that a row always has its traces."""
+        for row, traces in episodes:
+            if traces:
+                self.save_traces(row, traces)
+        self.rows += [dict(row) for row, _ in episodes]
+        if all(set(row) == set(self._columns) for row, _ in episodes):
             with (self.folder / "episodes.csv").open("a", encoding="utf-8", newline="") as file:
-                file.write(_line([row[column] for column in self._columns]))
+                file.write("".join(_line([row[column] for column in self._columns]) for row, _ in episodes))
                 file.flush()
                 os.fsync(file.fileno())
         else:

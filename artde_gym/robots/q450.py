@@ -83,6 +83,13 @@ def thrusts(u1: Number, u2: Number, u3: Number, u4: Number) -> tuple[Number, ...
     return lift + roll - pitch + yaw, lift + roll + pitch - yaw, lift - roll + pitch + yaw, lift - roll - pitch - yaw
 
 
+def rotor_heights(height: Number, ahead: Number, aside: Number) -> tuple[Number, Number, Number, Number]:
+    """World z of the rotors, elementwise, from that of the centre and those of the body's x and y axes."""
+    x, y = _SIDE * ahead, _SIDE * aside
+    both, apart = x + y, x - y
+    return height + both, height - apart, height - both, height + apart
+
+
 @functools.cache
 def q450() -> RobotSpec:
     """The quadrotor as one rigid body that can be pushed at its centre, `body`, and at each rotor."""
@@ -93,7 +100,7 @@ def q450() -> RobotSpec:
 
 
 def _visuals() -> tuple[Box, ...]:
-    """Boxes lie along the axes: an arm, at 45 degrees to them, is a row of small ones; a rotor disc is three flat ones."""
+    """Boxes lie along the axes: an arm, at 45 degrees to them, is a row of them; a rotor disc is three flat ones."""
     shapes = [Box((0.11, 0.11, 0.05), (0.0, 0.0, 0.0), _WHITE), Box((0.05, 0.04, 0.03), (0.0, 0.0, -0.04), _DARK)]
     for (x, y, _), colour in zip(ROTOR_PLACES, (_RED, _DARK, _DARK, _RED), strict=True):  # red is ahead
         steps = [0.2 + 0.8 * i / 9 for i in range(10)]

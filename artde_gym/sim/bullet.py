@@ -26,7 +26,7 @@ from artde_gym.arrays import Array
 from artde_gym.errors import RobotError
 from artde_gym.robots.spec import RobotSpec, Vector
 from artde_gym.robots.urdf import urdf
-from artde_gym.sim.engine import Camera, State
+from artde_gym.sim.engine import PAYLOAD_RADIUS, Camera, State
 
 
 @contextlib.contextmanager
@@ -48,7 +48,6 @@ GEAR_ITERATIONS = 30  # of the constraint solver; gears converge faster than bar
 BARE_ITERATIONS = 50
 GEAR_FORCE = 1e6  # N, more than any gear carries
 PAYLOAD_FORCE = 1e5  # N, likewise
-PAYLOAD_RADIUS = 0.08  # m: it shows on either side of the torso
 PAYLOAD_COLOUR = (0.85, 0.45, 0.1, 1.0)
 HOLD_TORQUE = 100.0  # Nm, of the motors that hold joints which nobody actuates
 

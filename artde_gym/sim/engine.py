@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from artde_gym.arrays import Array
 from artde_gym.robots.spec import RobotSpec, Vector
 
+PAYLOAD_RADIUS = 0.08  # m, of the homogeneous ball
+
 
 class State(NamedTuple):
     """One robot at one instant; positions and velocities are those of the base link's origin, in world axes.
@@ -101,7 +103,7 @@ class Engine(Protocol):
         ...
 
     def attach_payload(self, mass: float, position: Vector) -> None:
-        """Fix a ball of `mass` (kg) to the base link, its centre at `position` in the base frame (m).
+        """Fix a ball of `mass` (kg) and `PAYLOAD_RADIUS` to the base link, its centre at `position` in its frame (m).
 
         It takes over the base's motion, and falls freely once released.
         """

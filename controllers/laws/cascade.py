@@ -13,7 +13,8 @@ average since the sample before:
 The attitude law sees q = -e_q, q_ref = 0, qd = w, qd_ref = R^T R_d w_d, so that e = e_q and ed = e_w, and the
 acceleration qdd_ref = R^T R_d alpha_d - w x (R^T R_d w_d) that keeps both where they are. So any law of
 `controllers.laws` on `Signals` serves in either loop. alpha_d = (w_d,k+1 - w_d,k) / L is the mean over the coming
-period; the filter's pointwise acceleration, which jumps with its input, crashes at the thesis' gains.
+period; the filter's pointwise acceleration, which jumps with its input, crashes at the thesis' gains. (The yaw's own
+acceleration is in no observation and taken for zero.)
 
 Two variants of Dantu 2023, which fly into the ground, are there to be looked at: `remembered_force="commanded"` takes
 the *commanded* tau_p for the force of one sample ago ((tau_p)_L in its equation 3.6), although the attitude had not got
@@ -140,7 +141,8 @@ def cascade_start(position: Law, attitude: Law, gains: CascadeGains, flight: Fli
     """Memory before the first sample: as if the thrust that acts had been asked for, at rest, for long."""
     outer = _position_signals(flight, joined(scaled(flight.thrust_applied, flight.axes[2])))
     force = joined(_within_reach(gains, components(outer.tau_applied)))
-    command = FilterMemory(force, np.zeros_like(force))
+    rest = FilterMemory(force, np.zeros_like(force))
+    command = rest if gains.command == "filtered" else _reference_command(gains, force, flight)
     axes_ref, rates_ref = _attitude_command(command, flight, 0.0)
     inner = _attitude_signals(gains, flight, axes_ref, rates_ref, scaled(0.0, rates_ref))
     return CascadeMemory(
@@ -166,7 +168,7 @@ def cascade(
     reachable = _within_reach(gains, components(force))
     force = joined(reachable)
 
-    command, (axes_ref, rates_ref), turning = _command(gains, memory.command, force, flight, period)
+    command, axes_ref, rates_ref, turning = _command(gains, memory.command, force, flight, period)
     inner = _attitude_signals(gains, flight, axes_ref, rates_ref, turning)
     torque, attitude_memory = attitude.step(gains.attitude, memory.attitude, inner, period)
     thrust = dot(reachable, flight.axes[2])
@@ -187,18 +189,22 @@ def _position_signals(flight: Flight, applied: Array) -> Signals:
 
 def _command(
     gains: CascadeGains, before: FilterMemory, force: Array, flight: Flight, period: float
-) -> tuple[FilterMemory, tuple[Axes, Vector], Vector]:
-    """The command for the next sample, R_d and w_d of this one, and alpha_d."""
-    if gains.command == "filtered":
-        now, other, distance = before, second_order(before, force, gains.command_rate, 1.0, period), period
-        command = other
-    else:
-        now = FilterMemory(force, times(gains.position.m_bar, flight.jerk_ref))
+) -> tuple[FilterMemory, Axes, Vector, Vector]:
+    """The command for the next sample; R_d, w_d and alpha_d of this one."""
+    if gains.command == "filtered":  # the difference to the next sample, which is known already
+        now, distance = before, period
+        other = command = second_order(before, force, gains.command_rate, 1.0, period)
+    else:  # the difference to the sample before
         other, distance = before, -period
-        command = now
+        now = command = _reference_command(gains, force, flight)
     axes_ref, rates_ref = _attitude_command(now, flight, 0.0)
     _, rates_other = _attitude_command(other, flight, distance)
-    return command, (axes_ref, rates_ref), scaled(1 / distance, minus(rates_other, rates_ref))
+    return command, axes_ref, rates_ref, scaled(1 / distance, minus(rates_other, rates_ref))
+
+
+def _reference_command(gains: CascadeGains, force: Array, flight: Flight) -> FilterMemory:
+    """A force at the rate that the reference's jerk takes."""
+    return FilterMemory(force, times(gains.position.m_bar, flight.jerk_ref))
 
 
 def _attitude_command(command: FilterMemory, flight: Flight, distance: float) -> tuple[Axes, Vector]:

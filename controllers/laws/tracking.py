@@ -78,6 +78,8 @@ def smooth_sign(s: Array, eps: float) -> Array:
 
 def inner(v: Array, w: Array) -> Array:
     """v^T w over the last axis."""
+    if v.shape[-1] == 3:  # faster by components, and the same in any memory order: vecdot rounds by strides
+        return v[..., 0] * w[..., 0] + v[..., 1] * w[..., 1] + v[..., 2] * w[..., 2]
     return np.vecdot(v, w)
 
 

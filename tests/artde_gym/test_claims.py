@@ -34,7 +34,7 @@ def episodes(errors: dict[str, float], fell: dict[str, int] | None = None, n: in
     ("artde", "outcome"), [(0.60, "holds"), (0.85, "does not hold"), (1.3, "does not hold"), (0.709, "undecided")]
 )
 def test_improvement_by_at_least_29_percent(artde: float, outcome: str) -> None:
-    verdict = improves("S", "tde", "rmse_deg", 29.1)(episodes({"tde": 1.0, "artde": artde}))
+    verdict = improves("S", "tde", "rmse_deg", thesis.JOINTS, 29.1)(episodes({"tde": 1.0, "artde": artde}))
     assert verdict.outcome == outcome
     assert "20 pairs" in verdict.measured
 
@@ -43,17 +43,17 @@ def test_one_joint_that_fails_breaks_the_claim() -> None:
     result = episodes({"tde": 1.0, "artde": 0.5})
     table = result.episodes.copy()
     table.loc[table["controller"] == "artde", "rmse_deg_q3"] *= 1.8
-    verdict = improves("S", "tde", "rmse_deg", 29.1)(Result(table))
+    verdict = improves("S", "tde", "rmse_deg", thesis.JOINTS, 29.1)(Result(table))
     assert verdict.outcome == "does not hold"
     assert "q3" in verdict.measured
 
 
 def test_improvement_counts_only_pairs_that_walked() -> None:
     fallen = episodes({"tde": 1.0, "artde": 0.5}, fell={"tde": 20})
-    verdict = improves("S", "tde", "rmse_deg", 29.1)(fallen)
+    verdict = improves("S", "tde", "rmse_deg", thesis.JOINTS, 29.1)(fallen)
     assert verdict.outcome == "not measured"
     assert "tde" in verdict.measured
-    assert improves("S", "tde", "rmse_deg", 0.0)(episodes({"artde": 1.0})).outcome == "not measured"
+    assert improves("S", "tde", "rmse_deg", thesis.JOINTS)(episodes({"artde": 1.0})).outcome == "not measured"
 
 
 @pytest.mark.parametrize(
@@ -77,17 +77,20 @@ def test_repeats() -> None:
         parts = [episodes({"artde": error}, scenario=name).episodes for name, error in (("A", ratio), ("B", 1.0))]
         return Result(pd.concat(parts, ignore_index=True))
 
-    assert repeats("A", "B", "rmse_deg", 15.0)(both(1.05)).outcome == "holds"
-    assert repeats("A", "B", "rmse_deg", 15.0)(both(1.4)).outcome == "does not hold"
-    assert repeats("A", "B", "rmse_deg", 15.0)(both(0.6)).outcome == "does not hold"
+    assert repeats("A", "B", "rmse_deg", thesis.JOINTS, 15.0)(both(1.05)).outcome == "holds"
+    assert repeats("A", "B", "rmse_deg", thesis.JOINTS, 15.0)(both(1.4)).outcome == "does not hold"
+    assert repeats("A", "B", "rmse_deg", thesis.JOINTS, 15.0)(both(0.6)).outcome == "does not hold"
 
 
 def test_adaptation_against_the_equivalent_gain() -> None:
-    assert adapts("S")(episodes({"artde": 0.8, "tde+kd": 1.0})).outcome == "holds"
-    assert adapts("S")(episodes({"artde": 1.1, "tde+kd": 1.0})).outcome == "does not hold"
-    assert adapts("S")(episodes({"artde": 0.8, "tde+kd": 1.0}, {"artde": 13})).outcome == "does not hold"
-    assert adapts("S")(episodes({"artde": 0.8, "tde+kd": 1.0}, {"tde+kd": 13})).outcome == "holds"
-    assert adapts("S")(episodes({"artde": 1.0})).outcome == "not measured"
+    assert adapts("S", "tde+kd", "rmse_deg")(episodes({"artde": 0.8, "tde+kd": 1.0})).outcome == "holds"
+    assert adapts("S", "tde+kd", "rmse_deg")(episodes({"artde": 1.1, "tde+kd": 1.0})).outcome == "does not hold"
+    assert (
+        adapts("S", "tde+kd", "rmse_deg")(episodes({"artde": 0.8, "tde+kd": 1.0}, {"artde": 13})).outcome
+        == "does not hold"
+    )
+    assert adapts("S", "tde+kd", "rmse_deg")(episodes({"artde": 0.8, "tde+kd": 1.0}, {"tde+kd": 13})).outcome == "holds"
+    assert adapts("S", "tde+kd", "rmse_deg")(episodes({"artde": 1.0})).outcome == "not measured"
 
 
 def test_improvement_interval_covers_the_truth() -> None:

@@ -23,11 +23,13 @@ from artde_gym.errors import ArtdeGymError, DisturbanceError, OptionError, Store
 from artde_gym.evaluation import Frontier, frontier, statistics
 from artde_gym.evaluation.evaluate import Update
 from artde_gym.evaluation.frontier import LEVEL_COLUMNS, TABLE_COLUMNS, _frontier, search, value_text
-from artde_gym.evaluation.frontier_axis import DEFAULTS, Axis, axis, standard_test
+from artde_gym.evaluation.frontier_axis import Axis, axis
 from artde_gym.evaluation.frontier_figure import draw
+from artde_gym.evaluation.frontier_standard import STANDARDS, standard_test
 from artde_gym.evaluation.palette import LOOKS, OTHERS, looks
 
 PUSH = "BipedPush-v0"
+QUADROTOR = "QuadInfinity-Payload-v0"
 SITES = ("torso", "chest", "left_arm", "left_foot", "right_foot")
 SHORT: dict[str, Any] = {"duration": 0.3, "control_period": 0.004, "actuator_inertia": "lumped"}
 TINY: dict[str, Any] = {"low": 1.0, "high": 2.0, "tolerance": 0.5, "episodes": 1, "disturbances": {}}
@@ -137,41 +139,55 @@ def test_survival_that_rises_again_is_shown_as_it_is() -> None:
 # ---------------------------------------------------------------- paths
 
 
-def test_every_default_is_an_axis_and_every_level_of_it_is_in_the_grammar() -> None:
-    for path, default in DEFAULTS.items():
-        varied = axis(PUSH, path)
+@pytest.mark.parametrize(
+    ("env_id", "robot", "sites", "joints", "duration"),
+    [
+        (PUSH, "ojas", SITES, [f"left_q{i}" for i in range(1, 7)], 12.0),
+        (QUADROTOR, "q450", ["body"], ["front_left"], 20.0),
+    ],
+)
+def test_every_default_is_an_axis_and_every_level_of_it_is_in_the_grammar(
+    env_id: str, robot: str, sites: Any, joints: list[str], duration: float
+) -> None:
+    for path, default in STANDARDS[robot].ranges.items():
+        varied = axis(env_id, path)
         assert varied.path == path
         assert varied.harder == default.harder
         assert {varied.levels[0], varied.levels[-1]} == {default.low, default.high}
         assert np.abs(np.diff(varied.levels)).max() <= default.tolerance * (1 + 1e-5)
-        given_, arguments = standard_test(PUSH, varied, {})
-        assert arguments == {"duration": 12.0}
+        given_, arguments = standard_test(env_id, path, {})
+        assert arguments == {"duration": duration}
         for value in varied.levels:
             disturbances, _ = varied.place(value, given_, arguments)
-            Disturbances.parse(disturbances, SITES, [f"left_q{i}" for i in range(1, 7)])
+            Disturbances.parse(disturbances, sites, joints, robot)
 
 
 def test_standard_test_is_the_same_but_for_what_is_varied() -> None:
-    def test(path: str, **kwargs: Any) -> dict[str, Any]:
-        return standard_test(PUSH, axis(PUSH, path, **kwargs), {})[0]
+    def test(path: str, env_id: str = PUSH) -> dict[str, Any]:
+        return standard_test(env_id, path, {})[0]
 
     assert test("friction.coefficient")["payload"]["mass"] == 1.3
     assert [push["body"] for push in test("slope.pitch_deg")["push"]] == ["torso"]
     assert test("slope.pitch_deg")["friction"] == {"uniform": [0.7, 0.9]}
     (push,) = test("push.magnitude")["push"]
     assert (push["body"], push["duration"], push["start"]) == ("chest", 0.2, {"uniform": [5.0, 7.0]})
-    assert test("push.duration", low=0.1, high=1, tolerance=0.1)["push"] == [push]
+    assert test("push.duration")["push"] == [push]
+    assert test("wind.scale", QUADROTOR)["payload"]["drop"] == 35.0
+    assert "push" not in test("wind.scale", QUADROTOR)
+    assert test("push.magnitude", QUADROTOR)["push"][0]["body"] == "body"
+    (loss,) = test("actuator_loss.factor", QUADROTOR)["actuator_loss"]
+    assert loss == {"joint": "front_left", "start": {"uniform": [6.0, 16.0]}}
     with pytest.raises(OptionError, match="duration is 6"):
-        standard_test(PUSH, axis(PUSH, "push.magnitude"), {"duration": 6})
-    with pytest.raises(OptionError, match="no standard test"):
-        standard_test("Quadrotor-v0", axis(PUSH, "push.magnitude"), {})
+        standard_test(PUSH, "push.magnitude", {"duration": 6})
+    with pytest.raises(OptionError, match="an environment of artde_gym"):
+        standard_test("CartPole-v1", "push.magnitude", {})
 
 
 def test_same_draws_at_every_level() -> None:
     varied = axis(PUSH, "push.magnitude")
     drawn = []
     for value in (varied.low, varied.high):
-        disturbances, _ = varied.place(value, *standard_test(PUSH, varied, {}))
+        disturbances, _ = varied.place(value, *standard_test(PUSH, varied.path, {}))
         realised = Disturbances.parse(disturbances, SITES).draw(np.random.default_rng(3))
         assert realised["push"][0].pop("magnitude") == value
         drawn.append(realised)
@@ -211,6 +227,7 @@ def test_place_leaves_the_rest_alone() -> None:
         ({"path": "push.magnitude", "harder": "bigger"}, OptionError, ["harder", "bigger", "'larger'"]),
         ({"path": "torque_delay.samples", "tolerance": 0.5}, OptionError, ["tolerance", "0.5", "whole multiple of 1"]),
         ({"path": "control_period", "high": 0.0105}, OptionError, ["high", "0.0105", "whole multiple of 0.001"]),
+        ({"path": "wind.scale"}, UnknownNameError, ["wind.scale", "push.magnitude"]),
     ],
 )
 def test_bad_axes_are_refused(arguments: dict[str, Any], error: type[ArtdeGymError], words: list[str]) -> None:
@@ -220,14 +237,19 @@ def test_bad_axes_are_refused(arguments: dict[str, Any], error: type[ArtdeGymErr
         assert word in str(caught.value)
 
 
-def test_paths_follow_the_grammar() -> None:
+@pytest.mark.parametrize(("env_id", "robot"), [(PUSH, "ojas"), (QUADROTOR, "q450")])
+def test_paths_follow_the_grammar(env_id: str, robot: str) -> None:
     for kind in KINDS.values():
         for parameter in kind.parameters:
-            if parameter.size == 1:
+            if parameter.size == 1 and robot not in kind.robots:
+                with pytest.raises(UnknownNameError, match=kind.name):
+                    axis(env_id, f"{kind.name}.{parameter.name}")
+            elif parameter.size == 1:
                 high = parameter.low + min(parameter.high - parameter.low, 10.0)
                 span = high - parameter.low
                 step = 1.0 if parameter.integer else span
-                assert axis(PUSH, f"{kind.name}.{parameter.name}", parameter.low, high, step).unit == parameter.unit
+                path = f"{kind.name}.{parameter.name}"
+                assert axis(env_id, path, parameter.low, high, step).unit == parameter.unit
 
 
 # ---------------------------------------------------------------- a tiny run
@@ -297,6 +319,17 @@ def test_bad_arguments_leave_no_folder_behind(
     for word in words:
         assert word in str(caught.value)
     assert not (tmp_path / "run").exists()
+
+
+def test_quadrotors_in_batches(tmp_path: Path) -> None:
+    """What four rotors lift: 3.4 kg at most, so that a payload of 1 kg is carried and one of 2.6 kg is not."""
+    kwargs: dict[str, Any] = {"low": 1.0, "high": 2.6, "tolerance": 0.8, "episodes": 3, "env_kwargs": {"duration": 2.0}}
+    found = frontier(["artde"], QUADROTOR, "payload.mass", backend="batch", out=tmp_path / "run", **kwargs)
+    row = found.table.iloc[0]
+    assert row["relation"] == "="
+    assert row["low_rate"] == 1.0
+    assert row["high_rate"] == 0.0
+    assert not list((tmp_path / "run").rglob("*.npz"))
 
 
 def test_command(tmp_path: Path) -> None:

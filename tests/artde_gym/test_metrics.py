@@ -38,8 +38,9 @@ def measure(
 ) -> dict[str, Any]:
     """Metrics of one whole episode."""
     metrics = Metrics(*robot, period, [9.0], [kwargs.pop("events", {})], **kwargs)
-    metrics.add({name: values[:-1, None] for name, values in fields.items()}, many(diagnostics or {}))
-    metrics.add({name: values[-1:, None] for name, values in fields.items()}, None)
+    last = len(fields["phase"]) - 1
+    metrics.add(0, {name: values[:-1, None] for name, values in fields.items()}, many(diagnostics or {}))
+    metrics.add(last, {name: values[-1:, None] for name, values in fields.items()}, None)
     return metrics.rows()[0]
 
 
@@ -188,7 +189,8 @@ def test_effort_of_rotors() -> None:
     thrust = np.full((samples, 4), 4.0)
     thrust[1::2, 3] = 8.45  # within a hundredth of the range from its limit
     fields = flight(np.zeros((samples, 3)), wrench_applied=wrench, rotor_thrust=thrust)
-    row = measure(QUADROTOR, fields, {"sigma_p": np.full((100, 3), 2.0)}, period=0.01)
+    inside = {"sigma_p": np.full((100, 3), 2.0), "c_q": np.linspace(0.0, 1.0, 100)}
+    row = measure(QUADROTOR, fields, inside, period=0.01)
     assert row["rms_thrust_n_u1"] == pytest.approx(15.0)
     assert row["rms_torque_nm_u3"] == pytest.approx(0.2 / np.sqrt(2))
     assert row["rms_torque_nm_u2"] == row["thrust_variation_n_s"] == 0
@@ -199,6 +201,8 @@ def test_effort_of_rotors() -> None:
     assert row["energy_j"] == pytest.approx(3 * ideal + (ideal + loud) / 2)
     assert row["tde_error_rms_p"] == 2.0
     assert np.isnan(row["tde_error_rms_q"])
+    assert row["robust_gain_mean_q"] == pytest.approx(0.5)
+    assert np.isnan(row["robust_gain_mean_p"])
     assert "cost_of_transport" not in row
 
 
@@ -228,7 +232,7 @@ def test_blocks_do_not_matter(cuts: list[int], seed: int) -> None:
             now, policy = (
                 {name: values[start:stop] for name, values in signals.items()} for signals in (fields, inside)
             )
-            metrics.add(now, policy)
+            metrics.add(start, now, policy)
         return metrics.rows()
 
     for one, other in zip(rows([0, 60]), rows(sorted({0, 60, *cuts})), strict=True):
@@ -253,11 +257,11 @@ def test_episodes_side_by_side_are_as_if_alone() -> None:
             for values in fields.values():
                 values[k, 1] = np.nan
         block = {name: values[k : k + 1] for name, values in fields.items()}
-        together.add(block, {"attitude_error": own[k : k + 1]}, live)
+        together.add(k, block, {"attitude_error": own[k : k + 1]}, live)
     for i, (row, end) in enumerate(zip(together.rows(), last, strict=True)):
         alone = Metrics(*QUADROTOR, 0.1, [1.5], [events[i]])
         block = {name: values[: end + 1, i : i + 1] for name, values in fields.items()}
-        alone.add(block, {"attitude_error": own[: end + 1, i : i + 1]})
+        alone.add(0, block, {"attitude_error": own[: end + 1, i : i + 1]})
         expected = alone.rows()[0]
         assert {name: row[name] for name in expected} == pytest.approx(expected, rel=1e-12, nan_ok=True)
         assert all(np.isnan(row[name]) for name in row.keys() - expected.keys())

@@ -11,12 +11,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.linalg import solve_continuous_lyapunov
+from scipy.signal import cont2discrete
 
 from controllers.laws.artde import ArtdeGains, artde, artde_start
+from controllers.laws.asmc import AsmcGains, asmc, asmc_start
 from controllers.laws.atde import AtdeGains, atde, atde_start
 from controllers.laws.computed_torque import ComputedTorqueGains, computed_torque
 from controllers.laws.errors import GainError
+from controllers.laws.indi import IndiGains, indi, indi_start
 from controllers.laws.pid import PidGains, identity_gains, pid, pid_start
+from controllers.laws.positional_pid import PositionalPidGains, positional_pid, positional_pid_start
+from controllers.laws.rigid_attitude import RigidAttitudeGains, rigid_attitude
+from controllers.laws.second_order import FilterMemory, second_order
 from controllers.laws.tde import (
     ConstantGains,
     TdeGains,
@@ -42,6 +48,19 @@ FEEDBACK: dict[str, dict[str, Any]] = {
 ADAPTIVE = {"alpha": 4.0, "eps": 5e-5}
 ARTDE: dict[str, Any] = {**ADAPTIVE, "gamma_0": 500.0, "gamma_1": 500.0, "beta_floor": 0.01, "beta_start": 0.01}
 ROBUST: dict[str, Any] = {"growth": "midpoint", "clamp": True, "leakage": 0.1, "cap": 1.0}
+FILTER = {"filter_rate": 50.0, "filter_damping": 0.55}
+SLIDING: dict[str, Any] = {
+    "slope": 2.0,
+    "k_s": 3.0,
+    "c_floor": 0.5,
+    "gamma_c": 2.0,
+    "leakage_c": 0.1,
+    "eps": 0.01,
+    "gamma_r": 0.3,
+    "leakage_r": 0.05,
+    "r_max": 2.0,
+    "gravity": 9.81,
+}
 
 
 class Law(NamedTuple):
@@ -75,8 +94,27 @@ LAWS = {
         lambda gains, signals, period: (),
         lambda gains, memory, signals, period: (computed_torque(gains, signals, pendulums), memory),
     ),
+    "indi": Law(lambda feedback: IndiGains(**feedback, **FILTER), without_gains(indi_start), indi),
+    "asmc": Law(
+        lambda feedback: AsmcGains(feedback["m_bar"], **SLIDING),
+        lambda gains, signals, period: asmc_start(gains, signals),
+        asmc,
+    ),
+    "positional-pid": Law(
+        lambda feedback: PositionalPidGains(**feedback, k_i=3.0, integral_limit=20.0),
+        lambda gains, signals, period: positional_pid_start(gains, signals),
+        positional_pid,
+    ),
+    "rigid-attitude": Law(
+        lambda feedback: RigidAttitudeGains(feedback["k_p"], feedback["k_d"], feedback["m_bar"]),
+        lambda gains, signals, period: (),
+        lambda gains, memory, signals, period: (rigid_attitude(gains, signals), memory),
+    ),
 }
-CASES = [(name, feedback) for name in LAWS for feedback in FEEDBACK if (name, feedback) != ("pid", "matrix")]
+WITHOUT_MATRIX = ("pid", "asmc", "positional-pid", "rigid-attitude")
+CASES = [
+    (name, feedback) for name in LAWS for feedback in FEEDBACK if name not in WITHOUT_MATRIX or feedback != "matrix"
+]
 every_law = pytest.mark.parametrize(("name", "feedback"), CASES)
 
 
@@ -123,10 +161,10 @@ def test_batch_equals_loop_bit_for_bit(name, feedback, seed, batch, scale):
                 np.testing.assert_array_equal(many[index], one, strict=True)
 
 
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", LAWS.keys() - {"rigid-attitude"})
 def test_batch_equals_loop_for_twelve_joints_in_slices_of_observations(name):
     law, feedback = LAWS[name], FEEDBACK["scalar"]
-    if name != "pid":
+    if name not in WITHOUT_MATRIX:
         root = np.random.default_rng(1).normal(size=(12, 12))
         feedback = {**feedback, "m_bar": 0.01 * root @ root.T + 0.04 * np.eye(12)}
     gains = law.gains(feedback)
@@ -218,6 +256,80 @@ def test_pid_by_hand():
     # 20 + 3 * 0.5 * 0.5 + 4 * 0.5 * 0.5 + 5 * (0.5 * 1 - (1 - 0)) = 20 + 0.75 + 1 - 2.5
     tau, _ = pid(gains, memory, Signals(*np.array([[1.5], [1.0], [2.0], [1.5], [1.0], [20.0]])), 0.5)
     assert tau == 19.25
+
+
+def test_indi_with_an_instant_filter_is_tde():
+    gains = IndiGains(2.0, 4.0, 3.0, filter_rate=1e4, filter_damping=1.0)
+    samples = np.random.default_rng(10).normal(size=(9, 6, 3))
+    slow = run(LAWS["indi"], gains, samples, 0.5)
+    fast = run(LAWS["tde"], TdeGains(2.0, 4.0, 3.0), samples, 0.5)
+    for row, same in zip(slow, fast, strict=True):
+        np.testing.assert_allclose(row[0], same[0], rtol=1e-12)
+
+
+def test_indi_delays_acceleration_and_force_alike():
+    # a plant without disturbance, inertia qdd = tau: what the filters lose cancels, whatever moved before
+    gains, period = IndiGains(2.0, 4.0, 3.0, **FILTER), 0.01
+    rng = np.random.default_rng(11)
+    qd, memory = np.zeros(3), None
+    for _ in range(50):
+        force = rng.normal(size=3)
+        q_ref, qd_ref, zero = *rng.normal(size=(2, 3)), np.zeros(3)
+        before = Signals(zero, qd, q_ref, qd_ref, zero, zero)
+        memory = indi_start(before, period) if memory is None else memory
+        qd = qd + period / 2.0 * force
+        sample = before._replace(qd=qd, tau_applied=force)
+        tau, memory = indi(gains, memory, sample, period)
+        u = 3.0 * (sample.qd_ref - qd) + 4.0 * sample.q_ref
+        np.testing.assert_allclose(tau, 2.0 * u, rtol=1e-9, atol=1e-9)
+
+
+def test_positional_pid_by_hand():
+    gains = PositionalPidGains(m_bar=2.0, k_p=4.0, k_d=3.0, k_i=8.0, integral_limit=9.0)
+    # the integral starts at 10 / 2 - 0.5 = 4.5: 2 (0.5 + 4 + 3 + 4.5)
+    first = Signals(*np.array([[1.0], [0.0], [2.0], [1.0], [0.5], [10.0]]))
+    tau, memory = positional_pid(gains, positional_pid_start(gains, first), first, 0.5)
+    assert tau == 24.0
+    # 4.5 + 0.5 * 8 * 1: 2 (1 + 2 + 1.5 + 8.5), whatever was applied
+    second = Signals(*np.array([[1.5], [1.0], [2.0], [1.5], [1.0], [99.0]]))
+    tau, memory = positional_pid(gains, memory, second, 0.5)
+    assert tau == 26.0
+    assert memory.integral == 9.0  # 8.5 + 2, clamped
+    tau, memory = positional_pid(gains, memory, second._replace(q_ref=np.array([-100.0])), 0.5)
+    assert memory.integral == -9.0
+
+
+def test_asmc_by_hand():
+    gains = AsmcGains(
+        m_bar=2.0,
+        slope=2.0,
+        k_s=3.0,
+        c_floor=1.0,
+        gamma_c=0.5,
+        leakage_c=0.25,
+        eps=24.0,
+        gamma_r=0.01,
+        leakage_r=0.5,
+        r_max=4.0,
+        gravity=10.0,
+    )
+    # s = ed + 2 e = (3, 4), sqrt(25 + 24) = 7; the weight 20 is held by 30: r = 1.5
+    sample = signals((1.0, 0.0), (1.0, 4.0), tau_applied=(5.0, 30.0))
+    memory = asmc_start(gains, sample)
+    assert (memory.c, memory.r) == (1.0, 1.5)
+    # u - g = 2 ed + 3 s + s / 7, plus 10 upward
+    lifted = np.array([2.0 + 9.0 + 3 / 7, 8.0 + 12.0 + 4 / 7 + 10.0])
+    tau, memory = asmc(gains, memory, sample, 0.5)
+    np.testing.assert_allclose(tau, 1.5 * 2.0 * lifted, rtol=1e-14)
+    assert memory.c == 1.0 + 0.5 * 0.5 * 5.0
+    np.testing.assert_allclose(memory.r, 1.5 + 0.5 * (0.01 * (3 * lifted[0] + 4 * lifted[1]) - 0.5 * 0.5), rtol=1e-14)
+    # the gain leaks back to its floor
+    _, after = asmc(gains, memory._replace(c=np.array(2.0)), signals((0.0, 0.0), (0.0, 0.0)), 0.5)
+    assert after.c == 2.0 - 0.5 * 0.25 * 1.0
+    # the ratio stays within a factor of 4: weight too light, too heavy
+    quick = dataclasses.replace(gains, gamma_r=1e3)
+    for rising, bound in ((0.5, 4.0), (-0.5, 0.25)):
+        assert asmc(quick, memory, signals((0.0, 0.0), (0.0, rising)), 0.5)[1].r == bound
 
 
 # With Kp = Kd = 1, s = e / 2 + ed. |s| is 1 or 5 throughout: with eps = 24, sqrt(|s|^2 + eps) is 5 or 7.
@@ -470,6 +582,30 @@ def test_eigenvalues_of_any_description_of_m_bar():
             tde_eigenvalues(inertia, wrong)
 
 
+# --------------------------------------------------------------------------------------------------------- the low-pass
+
+
+@pytest.mark.parametrize("damping", [1.0, 0.999, 0.55, 0.05])
+@pytest.mark.parametrize(("natural", "period"), [(30.0, 0.015), (50.0, 0.001), (2.0, 1.0)])
+def test_second_order_is_exact_for_a_held_input(damping, natural, period):
+    a = np.array([[0.0, 1.0], [-(natural**2), -2 * damping * natural]])
+    b, c, d = np.array([[0.0], [natural**2]]), np.eye(2), np.zeros((2, 1))
+    system: Any = cont2discrete((a, b, c, d), period, method="zoh")
+    state, memory = np.array([0.3, -1.0]), FilterMemory(np.array(0.3), np.array(-1.0))
+    for u in np.random.default_rng(12).normal(size=20):
+        state = system[0] @ state + system[1][:, 0] * u
+        memory = second_order(memory, np.array(u), natural, damping, period)
+        np.testing.assert_allclose([memory.value, memory.rate], state, rtol=1e-9, atol=1e-9)
+
+
+@given(inputs=st.lists(st.floats(-1, 1), min_size=5, max_size=40), natural=st.floats(0.1, 300.0))
+def test_critically_damped_output_stays_among_its_inputs(inputs, natural):
+    memory = FilterMemory(np.array(inputs[0]), np.array(0.0))
+    for u in inputs:
+        memory = second_order(memory, np.array(u), natural, 1.0, 0.015)
+        assert min(inputs) - 1e-12 <= memory.value <= max(inputs) + 1e-12
+
+
 # --------------------------------------------------------------------------------------------------------------- errors
 
 GAINS: list[tuple[type, dict[str, Any]]] = [
@@ -479,8 +615,13 @@ GAINS: list[tuple[type, dict[str, Any]]] = [
     (ArtdeGains, {**FEEDBACK["scalar"], **ARTDE, **ROBUST}),
     (PidGains, {"proportional": 420.0, "integral": 1050.0, "derivative": 42.0}),
     (ComputedTorqueGains, {"k_p": 25.0, "k_d": 10.0}),
+    (RigidAttitudeGains, {"k_p": 25.0, "k_d": 10.0, "inertia": 0.04}),
+    (IndiGains, {**FEEDBACK["scalar"], **FILTER}),
+    (AsmcGains, {"m_bar": 0.042, **SLIDING}),
+    (PositionalPidGains, {**FEEDBACK["scalar"], "k_i": 3.0, "integral_limit": 20.0}),
 ]
-MAY_BE_ZERO = {"c", "gamma_0", "gamma_1", "leakage"}
+MAY_BE_ZERO = {"c", "gamma_0", "gamma_1", "leakage", "k_i", "integral_limit"}
+MAY_BE_ZERO |= {"k_s", "c_floor", "gamma_c", "leakage_c", "gamma_r", "leakage_r", "gravity"}
 NEVER_ALLOWED: list[Any] = [-1.0, math.nan, -math.inf, "25", None, [], [1.0, 0.0], [1.0, math.nan], [[1.0], [2.0]]]
 
 
@@ -524,6 +665,8 @@ def test_nominal_inertia_must_be_positive_definite(matrix):
         (ArtdeGains, "beta_start", 0.009),
         (ArtdeGains, "cap", 0.009),
         (ArtdeGains, "growth", "both"),
+        (IndiGains, "filter_damping", 1.01),
+        (AsmcGains, "r_max", 0.99),
     ],
 )
 def test_gains_that_contradict_each_other(kind, field, value):

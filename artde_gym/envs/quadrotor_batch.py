@@ -1,0 +1,236 @@
+"""`QuadInfinity-Payload-v0`, many vehicles at once in NumPy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Literal
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import ArrayLike, NDArray
+
+from artde_gym.arrays import Array
+from artde_gym.disturbances.noise import draw_key
+from artde_gym.disturbances.wind import GRID
+from artde_gym.envs import quadrotor_task as task
+from artde_gym.envs.options import disturbances_in, steps_per_period
+from artde_gym.envs.quadrotor_fleet import Fleet
+from artde_gym.errors import ActionError, OptionError
+from artde_gym.robots import q450 as robot
+
+FLEET = 4096  # vehicles that are simulated together; with more, arrays no longer fit into caches
+
+Mask = NDArray[np.bool_]
+
+
+class QuadInfinityPayloadVectorEnv(VectorEnv[Array, Array, Array]):
+    """doc."""
+
+    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}
+
+    action_layout = task.ACTION
+    observation_layout = task.OBSERVATION
+    robot_name: ClassVar[str] = "q450"
+    tracking = task.TRACKING
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        disturbances: Mapping[str, Any] | None = None,
+        control_period: float = 0.015,
+        measurement: Literal["ideal", "mocap"] = "ideal",
+        duration: float = 70.0,
+        dtype: Literal["float64", "float32"] = "float64",
+    ) -> None:
+        if isinstance(num_envs, bool) or not (isinstance(num_envs, int) and num_envs >= 1):
+            raise OptionError("num_envs", num_envs, "a whole number >= 1")
+        if dtype not in ("float64", "float32"):
+            raise OptionError("dtype", dtype, "'float64', 'float32'")
+        self.num_envs = num_envs
+        self.dtype = np.dtype(dtype)
+        self._disturbances = task.parse(task.DEFAULT_DISTURBANCES if disturbances is None else disturbances)
+        steps = steps_per_period(control_period, GRID)
+        self.control_period = steps * GRID
+        self.measurement = measurement
+        self.nominal_robot = robot.q450()
+        self._plan = np.ascontiguousarray(task.plan(duration, self.control_period).T, dtype=self.dtype)
+        self._last = self._plan.shape[1] - 1
+        self.single_observation_space = task.OBSERVATION.box(self.dtype)
+        self.single_action_space = task.ACTION.box(self.dtype)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        sizes = [min(FLEET, num_envs - first) for first in range(0, num_envs, FLEET)]
+        self._fleets = [
+            (slice(first, first + size), Fleet(size, steps, self.dtype))
+            for first, size in zip(range(0, num_envs, FLEET), sizes, strict=True)
+        ]
+        self._seeded = [seeding.np_random() for _ in range(num_envs)]  # generators and their seeds
+        self._k = np.zeros(num_envs, np.int64)
+        self._over: Mask | None = None  # where the next step begins a new flight; None before the first reset
+
+    @property
+    def np_random(self) -> tuple[np.random.Generator, ...]:
+        """The generator of each environment."""
+        return tuple(rng for rng, _ in self._seeded)
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:
+        """The seed of each environment's generator."""
+        return tuple(seed for _, seed in self._seeded)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """An attribute, once for each environment."""
+        return (getattr(self, name),) * self.num_envs
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, dict[str, Any]]:
+        """Start flights.
+
+        Args:
+            seed: one for each environment, or a number from which on they count; without, the generators go on.
+            options: those of the class' documentation, and Gymnasium's "reset_mask" (n,), where to reset.
+
+        Raises:
+            OptionError: for an unknown option or value, or a scenario that needs another environment.
+            DisturbanceError: for a malformed disturbance.
+        """
+        options = dict(options or {})
+        mask = self._mask(options.pop("reset_mask", None))
+        seeds = self._seeds(seed)
+        disturbances = disturbances_in(options, self)
+        if disturbances is not None:
+            self._disturbances = task.parse(disturbances)
+        for i in np.flatnonzero(mask).tolist():
+            if seeds[i] is not None:
+                self._seeded[i] = seeding.np_random(seeds[i])
+        info = self._begin(mask)
+        self._over = np.zeros(self.num_envs, np.bool_) if self._over is None else self._over & ~mask
+        return self._truth().T, info
+
+    def step(self, actions: ArrayLike) -> tuple[Array, Array, Mask, Mask, dict[str, Any]]:
+        """Apply wrenches for one control period; flights that were over begin anew instead.
+
+        Raises:
+            ActionError: for a wrong shape, or a value that is not finite in a flight that goes on.
+            gymnasium.error.ResetNeeded: before the first reset.
+        """
+        if self._over is None:
+            raise gym.error.ResetNeeded("the flights have not begun: call reset()")
+        over, commands = self._over, self._commands(actions)
+        before = [fleet.thrusts for _, fleet in self._fleets]
+        events: dict[int, list[str]] = {}
+        for part, fleet in self._fleets:
+            for vehicle, words in fleet.advance(commands[:, part]).items():
+                events[part.start + vehicle] = words
+        self._k += 1
+        info = self._begin(over)
+        observation = self._truth()
+        rewards, terms, reasons = self._score(observation, before)
+        rewards[over] = 0.0
+        goes_on = ~over
+        terminated = (reasons != 0) & goes_on
+        truncated = (self._k >= self._last) & goes_on
+        self._over = terminated | truncated
+        info["time_s"], info["_time_s"] = self._k * self.control_period, np.ones_like(over)
+        info["reward_terms"] = {**terms, **{f"_{name}": goes_on.copy() for name in terms}}
+        info["_reward_terms"] = goes_on
+        if terminated.any():
+            words = np.array([None, *task.FALL_REASONS], dtype=object)
+            info["fall_reason"], info["_fall_reason"] = words[np.where(terminated, reasons, 0)], terminated.copy()
+        if events:
+            told = np.full(self.num_envs, None, dtype=object)
+            for i, texts in events.items():
+                told[i] = texts
+            info["events"], info["_events"] = told, told != np.array(None)
+        return observation.T, rewards, terminated, truncated, info
+
+    def _commands(self, actions: ArrayLike) -> Array:
+        """Checked actions as an array of ours (4, n)."""
+        given = np.asarray(actions)
+        if given.shape != (self.num_envs, 4):
+            raise ActionError("shape of the actions", given.shape, f"({self.num_envs}, 4)")
+        with np.errstate(over="ignore"):  # of a cast to float32
+            commands = np.array(given.T, dtype=self.dtype, order="C")
+        commands[:, self._over] = 0.0
+        if not np.isfinite(commands).all():
+            i = int(np.flatnonzero(~np.isfinite(commands).all(axis=0))[0])
+            raise ActionError(f"action of environment {i}", given[i].tolist(), "finite [u1 (N), u2, u3, u4 (Nm)]")
+        return commands
+
+    def _mask(self, given: Any) -> Mask:
+        if given is None:
+            return np.ones(self.num_envs, np.bool_)
+        mask = np.asarray(given)
+        if mask.dtype != np.bool_ or mask.shape != (self.num_envs,) or not mask.any():
+            raise OptionError("reset_mask", given, f"({self.num_envs},) truth values, one of them true at least")
+        if self._over is None and not mask.all():
+            raise OptionError("reset_mask", given, "all true in the first reset")
+        return mask
+
+    def _seeds(self, given: int | Sequence[int | None] | None) -> list[int | None]:
+        if given is None:
+            return [None] * self.num_envs
+        if isinstance(given, (int, np.integer)):
+            return [int(given) + i for i in range(self.num_envs)]
+        if len(given) != self.num_envs:
+            raise OptionError("number of seeds", len(given), f"{self.num_envs}, one for each environment")
+        return [None if seed is None else int(seed) for seed in given]
+
+    def _begin(self, mask: Mask) -> dict[str, Any]:
+        """Begin new flights where the mask is true; returns what is to be told of them."""
+        if not mask.any():
+            return {}
+        drawn = np.full(self.num_envs, None, dtype=object)
+        for part, fleet in self._fleets:
+            for vehicle in np.flatnonzero(mask[part]).tolist():
+                rng, _ = self._seeded[part.start + vehicle]
+                realised = drawn[part.start + vehicle] = self._disturbances.draw(rng)
+                fleet.begin(vehicle, realised, draw_key(rng))
+        self._k[mask] = 0
+        time = self._k * self.control_period
+        return {"time_s": time, "_time_s": mask.copy(), "disturbances": drawn, "_disturbances": mask.copy()}
+
+    def _truth(self) -> Array:
+        """The observation without errors of measurement (size, n)."""
+        out = np.empty((task.OBSERVATION.size, self.num_envs), self.dtype)
+        together = self._k.min() == self._k.max()
+        for part, fleet in self._fleets:
+            block, bodies = out[:, part], fleet.bodies
+            block[task.OBSERVATION["position"]] = bodies.origin()
+            block[task.OBSERVATION["velocity"]] = bodies.origin_velocity()
+            block[task.OBSERVATION["rot_body_to_world"]] = bodies.rot.reshape(9, -1)
+            block[task.OBSERVATION["body_rates"]] = bodies.rates
+            plan = self._plan[:, self._k[:1]] if together else self._plan.take(self._k[part], axis=1)
+            block[task.REFERENCE] = plan[:-1]
+            block[task.OBSERVATION["wrench_applied"]] = fleet.wrenches
+            block[task.OBSERVATION["rotor_thrust"]] = fleet.thrusts
+            block[task.PHASE] = plan[-1]
+        return out
+
+    def _score(self, truth: Array, before: Sequence[Array]) -> tuple[Array, dict[str, Array], NDArray[np.int8]]:
+        """Rewards, their terms, and the number of the reason of a fall, counted from 1, 0 without one; all (n,)."""
+        at = task.OBSERVATION
+        terms = {name: np.empty(self.num_envs, self.dtype) for name in task.REWARD_SCALES}
+        rewards, reasons = np.empty(self.num_envs), np.zeros(self.num_envs, np.int8)
+        for (part, fleet), thrusts in zip(self._fleets, before, strict=True):
+            block = truth[:, part]
+            error = block[at["position_ref"]] - block[at["position"]]
+            velocity_error = block[at["velocity_ref"]] - block[at["velocity"]]
+            up = fleet.bodies.rot[2, 2]
+            own = task.reward_terms(
+                tuple(error), tuple(velocity_error), up, tuple(fleet.thrusts), tuple(thrusts), np.exp
+            )
+            total: Any = 0.0
+            for name, scale in task.REWARD_SCALES.items():
+                total = total + scale * own[name]
+                terms[name][part] = own[name]
+            rewards[part] = self.control_period * total
+            falls = task.falls(tuple(block[at["position"]]), up, tuple(block[at["body_rates"]]))
+            for number in range(len(falls), 0, -1):  # the first reason wins
+                reasons[part][falls[number - 1]] = number
+        return rewards, terms, reasons

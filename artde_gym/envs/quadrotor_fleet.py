@@ -1,0 +1,237 @@
+"""Many quadrotors at once, in NumPy alone: what `artde_gym.envs.quadrotor` lets an engine do, with rigid bodies.
+
+Vehicle and payload are one body until the payload is dropped. Everything happens on the grid of `GRID`: forces act over
+a step, the air is that where the vehicle is in the middle of it, and what begins or ends does so with a step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from artde_gym.arrays import Array
+from artde_gym.disturbances.ground_effect import thrust_gain
+from artde_gym.disturbances.kinds import KINDS
+from artde_gym.disturbances.noise import uniform_noise
+from artde_gym.disturbances.schedule import Push
+from artde_gym.disturbances.wind import GRID, Air, advance, air, velocity
+from artde_gym.envs import quadrotor_task as task
+from artde_gym.robots import q450 as robot
+from artde_gym.robots.lag import follow, lag_shares
+from artde_gym.sim.engine import PAYLOAD_RADIUS
+from artde_gym.sim.rigid_bodies import MassProperties, RigidBodies, composite, cross, transposed_times
+
+FINE = 0.001  # s, resolution of pushes
+PARTS = round(GRID / FINE)
+NEVER = 2**62  # steps
+SLOTS = int(KINDS["torque_delay"].parameters[0].high) + 1  # commands that a delay has to remember
+
+_SITES = {name: place for name, _, place in robot.q450().sites}
+
+
+class _Event(NamedTuple):
+    """What happens to one vehicle at the beginning of a step; `text` tells of it, if it is worth telling."""
+
+    step: int
+    text: str
+    act: Callable[[], None]
+
+
+class Fleet:
+    """`n` vehicles.
+
+    Args:
+        n: how many.
+        steps: grid steps of a control period.
+        dtype: of all numbers.
+
+    Attributes:
+        bodies: their motion.
+        thrusts: of the rotors now (4, n) (N).
+        wrenches: mean [u1, u2, u3, u4] of the last control period (4, n) (N, Nm), without the gain near the ground.
+    """
+
+    def __init__(self, n: int, steps: int, dtype: DTypeLike) -> None:
+        self.bodies = RigidBodies(n, dtype)
+        self.thrusts, self.wrenches = np.zeros((4, n), dtype), np.zeros((4, n), dtype)
+        self._steps = steps
+        self._step = 0  # since the fleet was built
+        self._begun = np.zeros(n, np.int64)  # at which step each episode began
+        self._agenda: list[list[_Event]] = [[] for _ in range(n)]  # of each vehicle, the next event last
+        self._due = np.full(n, NEVER)  # step of each vehicle's next event
+        self._shares = np.zeros((2, n), dtype)  # of the rotors' lag
+        self._left = np.ones((4, n), dtype)  # share of each rotor's thrust
+        self._delay = np.zeros(n, np.int64)  # control periods
+        self._late: Array | None = None  # aims of the last periods (SLOTS, 4, n), once a vehicle needs them
+        self._air = np.zeros((len(Air._fields), n), dtype)
+        self._here = Air(*self._air)  # the same numbers
+        self._keys = np.zeros(n, np.uint64)
+        self._ambient, self._gust = np.zeros((3, n), dtype), np.zeros(n, dtype)
+        self._windy = False
+        self._ground_effect = np.zeros(n, dtype)
+        self._pushes = np.zeros((0, 3, n), dtype)  # forces that act (N, world axes)
+        self._places = np.zeros((0, 3, n), dtype)  # where (m, body axes)
+
+    def begin(self, vehicle: int, realised: Mapping[str, Any], key: int) -> None:
+        """Begin an episode of one vehicle, at rest in balance, with realised disturbances and the key of its noise."""
+        self._begun[vehicle] = self._step
+        self._begin_rotors(vehicle, realised)
+        self._air[:, vehicle] = air(realised.get("wind"))
+        self._keys[vehicle] = key
+        self._ambient[:, vehicle] = self._gust[vehicle] = 0.0
+        self._windy |= "wind" in realised
+        self._ground_effect[vehicle] = realised.get("ground_effect", {}).get("strength", 0.0)
+
+        factor = realised.get("mass_error", {}).get("factor", 1.0)
+        bare = MassProperties(factor * robot.MASS, (0.0, 0.0, 0.0), factor * np.diag(robot.INERTIA))
+        payload = realised.get("payload")
+        carried = payload is not None and payload["attach"] == 0.0 < payload["drop"]
+        self.bodies.set_properties(vehicle, composite(bare, _ball(payload)) if carried else bare)
+        self.bodies.place(vehicle, task.start(realised))
+
+        events = [*self._push_events(vehicle, realised), *self._loss_events(vehicle, realised)]
+        if payload is not None and payload["drop"] > payload["attach"]:
+            change = partial(self.bodies.set_properties, vehicle)
+            if not carried:
+                loaded = partial(change, composite(bare, _ball(payload)))
+                events.append(_Event(round(payload["attach"] / GRID), "payload attached", loaded))
+            events.append(_Event(round(payload["drop"] / GRID), "payload dropped", partial(change, bare)))
+        events.sort(key=lambda event: event.step)
+        self._agenda[vehicle] = events[::-1]
+        self._await(vehicle)
+
+    def advance(self, commands: Array) -> dict[int, list[str]]:
+        """Let wrenches [u1, u2, u3, u4] (4, n) (N, Nm) act for one control period; returns events by vehicle."""
+        events: dict[int, list[str]] = {}
+        bodies, aims = self.bodies, self._aims(commands)
+        goals = aims * self._left
+        if self._windy:
+            index = (self._step - self._begun).astype(np.uint64) + np.arange(self._steps, dtype=np.uint64)[:, None]
+            noise = uniform_noise(self._keys, index, self.thrusts.dtype)
+        total = np.zeros_like(self.thrusts)
+        for step in range(self._steps):
+            bodies.drift(GRID if step else 0.5 * GRID)
+            if self._step >= self._soonest:
+                self._happen(events)
+                goals = aims * self._left
+            self.thrusts, mean = follow(self.thrusts, goals, *self._shares)
+            total += mean
+            origin = bodies.origin()
+            wind = self._wind(origin, noise[:, step]) if self._windy else 0.0
+            u1, *torques = robot.wrench(*(mean * self._gains(origin[2])))
+            force = bodies.rot[:, 2] * u1
+            force += robot.DRAG * (wind - bodies.origin_velocity())
+            bodies.kick(GRID, *self._pushed(force, np.stack(torques)))
+            self._step += 1
+        bodies.drift(0.5 * GRID)
+        self.wrenches = np.stack(robot.wrench(*(total / self._steps)))
+        return events
+
+    def _begin_rotors(self, vehicle: int, realised: Mapping[str, Any]) -> None:
+        hover = task.hover_thrusts(realised)
+        self.thrusts[:, vehicle] = hover
+        self.wrenches[:, vehicle] = robot.wrench(*hover)
+        constant = realised.get("motor_lag", {}).get("time_constant", robot.ROTOR_LAG)
+        self._shares[:, vehicle] = lag_shares(constant, GRID)
+        self._left[:, vehicle] = 1.0
+        self._delay[vehicle] = realised.get("torque_delay", {}).get("samples", 0)
+        if self._late is None and self._delay[vehicle]:
+            self._late = np.zeros((SLOTS, *self.thrusts.shape), self.thrusts.dtype)
+        if self._late is not None:
+            self._late[..., vehicle] = hover
+
+    def _aims(self, commands: Array) -> Array:
+        """What the rotors aim at (4, n) (N) during a control period that begins with these commands."""
+        aims = np.stack(robot.thrusts(*commands))
+        np.clip(aims, 0.0, robot.MAX_THRUST, out=aims)
+        if self._late is None:
+            return aims
+        period = self._step // self._steps
+        self._late[period % SLOTS] = aims
+        return self._late[(period - self._delay) % SLOTS, :, np.arange(aims.shape[1])].T
+
+    def _wind(self, origin: Array, noise: Array) -> Array:
+        """Velocity of the air at each vehicle's place during this step (3, n) (m/s), world axes."""
+        here, (x, y, z), (ax, ay, az) = self._here, origin, self._ambient
+        wind = np.stack(velocity(here, (ax, ay, az), self._gust, (x, y, z), np.exp))
+        self._ambient = advance(here.ambient_keep, here.ambient_kick, self._ambient, noise[:3])
+        self._gust = advance(here.gust_keep, here.gust_kick, self._gust, noise[3])
+        return wind
+
+    def _gains(self, height: Array) -> Array | float:
+        """Gain of each rotor's thrust near the ground (4, n)."""
+        if not self._ground_effect.any():
+            return 1.0
+        heights = np.stack(robot.rotor_heights(height, *self.bodies.rot[2, :2]))
+        return thrust_gain(heights, robot.ROTOR_RADIUS, self._ground_effect, np.maximum)
+
+    def _pushed(self, force: Array, torque: Array) -> tuple[Array, Array]:
+        """Force and torque with those of the pushes that act."""
+        for push, place in zip(self._pushes, self._places, strict=True):
+            acts = push.any(axis=0)
+            if acts.any():
+                np.add(force, push, out=force, where=acts)
+                np.add(torque, cross(place, transposed_times(self.bodies.rot, push)), out=torque, where=acts)
+        return force, torque
+
+    def _push_events(self, vehicle: int, realised: Mapping[str, Any]) -> list[_Event]:
+        """Pushes act for the share of a step that they cover."""
+        pushes = [Push.of(entry, FINE) for entry in realised.get("push", ())]
+        missing = max(0, len(pushes) - len(self._pushes))
+        self._pushes, self._places = (
+            np.concatenate([slots, np.zeros((missing, *slots.shape[1:]), slots.dtype)])
+            for slots in (self._pushes, self._places)
+        )
+        self._pushes[..., vehicle] = 0.0
+        events: list[_Event] = []
+        for slot, push in enumerate(pushes):
+            self._places[slot, :, vehicle] = _SITES[push.site]
+            first, last = push.first // PARTS, push.end // PARTS
+            texts = {first: f"push {slot} begins", last: f"push {slot} ends"}
+            for step in sorted({first, first + 1, last, last + 1}):
+                covered = min(push.end, (step + 1) * PARTS) - max(push.first, step * PARTS)
+                force = np.multiply(push.force, max(0, covered) / PARTS)
+                act = partial(self._push, slot, vehicle, force)
+                events.append(_Event(step, texts.get(step, ""), act))
+        return events
+
+    def _push(self, slot: int, vehicle: int, force: Array) -> None:
+        self._pushes[slot, :, vehicle] = force
+
+    def _loss_events(self, vehicle: int, realised: Mapping[str, Any]) -> list[_Event]:
+        return [
+            _Event(
+                round(loss["start"] / GRID),
+                "",
+                partial(self._lose, vehicle, robot.ROTORS.index(loss["joint"]), loss["factor"]),
+            )
+            for loss in realised.get("actuator_loss", ())
+        ]
+
+    def _lose(self, vehicle: int, rotor: int, factor: float) -> None:
+        self._left[rotor, vehicle] *= factor
+
+    def _happen(self, told: dict[int, list[str]]) -> None:
+        """Bring about what is due, and tell of it."""
+        for vehicle in np.flatnonzero(self._due <= self._step).tolist():
+            agenda = self._agenda[vehicle]
+            while agenda and self._begun[vehicle] + agenda[-1].step <= self._step:
+                event = agenda.pop()
+                event.act()
+                if event.text:
+                    told.setdefault(vehicle, []).append(event.text)
+            self._await(vehicle)
+
+    def _await(self, vehicle: int) -> None:
+        agenda = self._agenda[vehicle]
+        self._due[vehicle] = self._begun[vehicle] + agenda[-1].step if agenda else NEVER
+        self._soonest = self._due.min()
+
+
+def _ball(payload: Mapping[str, Any]) -> MassProperties:
+    moment = 0.4 * payload["mass"] * PAYLOAD_RADIUS**2
+    return MassProperties(payload["mass"], payload["position"], moment * np.eye(3))

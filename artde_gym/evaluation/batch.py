@@ -1,0 +1,89 @@
+"""Many episodes at once: a vector environment, a policy and one seed an episode in; metrics out, hardly any traces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from artde_gym.arrays import Array
+from artde_gym.evaluation.metrics import Span
+from artde_gym.evaluation.rollout import PROGRESS_INTERVAL, Episode, Policy, metrics_for, row_of, stack, traces_of
+
+
+def run_batch(
+    env: Any,
+    policy: Policy,
+    seeds: Sequence[int],
+    *,
+    trace_hz: float = 100.0,
+    traced: int = 0,
+    phases: Sequence[Span] = (),
+    on_progress: Callable[[float], None] | None = None,
+) -> list[Episode]:
+    """Drive a vector environment from a reset with `seeds` until all its episodes have ended.
+
+    All metrics are those of `run_episode`. Nothing of an episode depends on the others beside it. An episode that has
+    ended counts no more; the environment may go on with it as it likes.
+
+    Args:
+        env: a vector environment of this project, of as many environments as there are seeds.
+        policy: takes the observations of all of them at once.
+        seeds: of the episodes.
+        trace_hz: rate of the traces, at most the control rate; infinite for every sample.
+        traced: the first so many episodes leave traces.
+        phases: see `Metrics`.
+        on_progress: called with the simulated time (s) about once a simulated second.
+    """
+    period: float = env.control_period
+    stride = max(1, round(1.0 / (trace_hz * period)))
+    report_every = max(1, round(PROGRESS_INTERVAL / period))
+    diagnose = getattr(policy, "diagnostics", None)
+    split = env.observation_layout.split
+
+    observation, info = env.reset(seed=list(seeds))
+    disturbances = list(info["disturbances"])
+    metrics = metrics_for(env, disturbances, phases)
+    live = np.ones(len(seeds), dtype=np.bool_)
+    steps, total = np.zeros(len(seeds), dtype=np.int64), np.zeros(len(seeds))
+    reasons: dict[int, str] = {}
+    observations, diagnostics = [observation[:traced].copy()], []
+    state, episode_start, k = None, live, 0
+    while live.any():
+        action, state = policy.predict(observation, state=state, episode_start=episode_start, deterministic=True)
+        inside = {} if diagnose is None else diagnose(state)
+        metrics.add(k, _sample(split(observation)), _sample(inside), live)
+        if traced and k % stride == 0:
+            diagnostics.append({name: values[:traced].copy() for name, values in inside.items()})
+        observation, reward, terminated, truncated, info = env.step(action)
+        k += 1
+        total += np.where(live, reward, 0.0)
+        if traced and k % stride == 0:
+            observations.append(observation[:traced].copy())
+        episode_start = terminated | truncated
+        ended = live & episode_start
+        if ended.any():
+            metrics.add(k, _sample(split(observation)), None, ended)  # nothing is decided there any more
+            steps[ended] = k
+            reasons |= {int(i): info["fall_reason"][i] for i in np.flatnonzero(live & terminated)}
+            live = live & ~ended
+        if on_progress is not None and k % report_every == 0:
+            on_progress(k * period)
+
+    episodes = []
+    for i, row in enumerate(metrics.rows()):
+        traces: dict[str, Array] = {}
+        if i < traced:
+            seen, decided = int(steps[i]) // stride + 1, int(steps[i] - 1) // stride + 1
+            fields = split(np.array([sample[i] for sample in observations[:seen]]))
+            own = stack([{name: values[i] for name, values in sample.items()} for sample in diagnostics[:decided]])
+            traces = traces_of(stride * period, fields, own)
+        row = row_of(reasons.get(i), float(steps[i] * period), float(total[i]), row, disturbances[i])
+        episodes.append(Episode(row, traces))
+    return episodes
+
+
+def _sample(signals: dict[str, Array]) -> dict[str, Array]:
+    """One sample as a block."""
+    return {name: values[None] for name, values in signals.items()}

@@ -1,0 +1,100 @@
+"""Registered environments by id: what they take, what they track, and one to run."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import json
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import gymnasium as gym
+from gymnasium.envs.registration import load_env_creator
+
+from artde_gym.errors import OptionError, among
+from artde_gym.tracking import Tracking
+
+Backend = Literal["single", "batch"]
+"""One environment for each episode in a physics engine, or many episodes in one vector environment."""
+
+KEPT = 4  # environments a process; each one holds a physics client
+
+
+def arguments_of(env_id: str, backend: Backend = "single") -> Mapping[str, inspect.Parameter]:
+    """Arguments of an environment by name, the number of environments in a vector excepted.
+
+    Raises:
+        gymnasium.error.Error: if there is no such environment.
+        OptionError: if it has no vector environment of its own and the backend needs one.
+    """
+    known = dict(inspect.signature(load_env_creator(_entry_point(env_id, backend))).parameters)
+    known.pop("num_envs", None)
+    return known
+
+
+def tracking_of(env_id: str) -> Tracking:
+    """What an environment of this project tracks.
+
+    Raises:
+        OptionError: for any other environment.
+    """
+    return _class(env_id).tracking
+
+
+def robot_of(env_id: str) -> str:
+    """Name of the robot in an environment of this project.
+
+    Raises:
+        OptionError: for any other environment.
+    """
+    return _class(env_id).robot_name
+
+
+def ours() -> list[str]:
+    """Ids of this project's environments."""
+    return [spec.id for spec in gym.registry.values() if str(spec.entry_point).startswith("artde_gym.")]
+
+
+@functools.lru_cache(maxsize=KEPT)
+def single(env_id: str, arguments: str) -> Any:
+    """An environment by id and JSON arguments; building one takes seconds, so a few are kept.
+
+    Raises:
+        OptionError: for an unknown argument, or as the environment itself.
+    """
+    return gym.make(env_id, disable_env_checker=True, **_checked(env_id, arguments, "single"))
+
+
+def vector(env_id: str, arguments: str, size: int) -> Any:
+    """A vector of `size` environments by id and JSON arguments.
+
+    Raises:
+        OptionError: as of `single`, or for an environment that has no vector of its own.
+    """
+    given = _checked(env_id, arguments, "batch")
+    return gym.make_vec(env_id, size, vectorization_mode="vector_entry_point", **given)
+
+
+def _class(env_id: str) -> Any:
+    creator: Any = load_env_creator(_entry_point(env_id, "single"))
+    if not hasattr(creator, "tracking"):
+        raise OptionError("env_id", env_id, "an environment of artde_gym")
+    return creator
+
+
+def _checked(env_id: str, arguments: str, backend: Backend) -> dict[str, Any]:
+    known, given = arguments_of(env_id, backend), json.loads(arguments)
+    for name in given:
+        if name not in known:
+            raise OptionError(f"argument of {env_id}", name, among(name, known))
+    return given
+
+
+def _entry_point(env_id: str, backend: Backend) -> str:
+    spec = gym.spec(env_id)
+    if backend == "single":
+        return str(spec.entry_point)
+    if spec.vector_entry_point is None:
+        able = [name for name in ours() if gym.spec(name).vector_entry_point]
+        raise OptionError("environment of the batch backend", env_id, ", ".join(able))
+    return str(spec.vector_entry_point)

@@ -1,0 +1,161 @@
+"""Many free rigid bodies at once, in NumPy alone: each with constants of its own, none touching another.
+
+Components lie along the first axes and bodies along the last one, (3, n), and all arithmetic is elementwise, so that
+what happens to a body does not depend on how many others there are.
+
+A step of h is a drift of h/2, a kick of h with forces that belong to the middle of it, and a drift of h/2; neighbouring
+drifts may be made one. The error of this splitting is of second order:
+
+drift h:   p <- p + h v,   q <- q (1, w / |w| tan(h |w| / 2)) / norm
+kick h:    v <- v + h (F / m + g),   w <- w + h w',   I w' = tau - w_m x I w_m
+
+with p, v of the centre of mass in world axes, q from body to world, and w, I, tau in body axes about the centre of
+mass. w_m = w + h/2 w' of the kick before belongs to the middle of the kick.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from artde_gym.arrays import Array
+from artde_gym.robots.dynamics import GRAVITY
+from artde_gym.robots.spec import Vector
+
+ALL = slice(None)
+
+_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
+
+
+class MassProperties(NamedTuple):
+    """Of one rigid body: mass (kg), centre of mass in the body frame (m), inertia about it (3, 3) (kg m^2)."""
+
+    mass: float
+    com: Vector
+    inertia: Array
+
+
+def composite(*parts: MassProperties) -> MassProperties:
+    """Several bodies fixed to each other as one."""
+    mass = sum(part.mass for part in parts)
+    com = np.sum([part.mass * np.asarray(part.com) for part in parts], axis=0) / mass
+    inertia = np.zeros((3, 3))
+    for part in parts:
+        arm = np.asarray(part.com) - com
+        inertia += part.inertia + part.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    x, y, z = com.tolist()
+    return MassProperties(mass, (x, y, z), inertia)
+
+
+class RigidBodies:
+    """The states of `n` bodies.
+
+    Attributes:
+        com, com_velocity: of the centres of mass (3, n) (m, m/s), world axes.
+        quat_xyzw: body to world (4, n).
+        rot: the same as matrices (3, 3, n).
+        rates: angular velocities (3, n) (rad/s), body axes.
+    """
+
+    def __init__(self, n: int, dtype: DTypeLike) -> None:
+        def zeros(*shape: int) -> Array:
+            return np.zeros((*shape, n), dtype)
+
+        self.com, self.com_velocity, self.rates = zeros(3), zeros(3), zeros(3)
+        self.quat_xyzw, self.rot = zeros(4), zeros(3, 3)
+        self._arm, self._arm_cross = zeros(3), zeros(3, 3)  # of the centre of mass, body axes; and the matrix -arm x
+        self._inverse_mass = zeros()
+        self._inertia, self._inverse_inertia = zeros(3, 3), zeros(3, 3)
+        self._acceleration = zeros(3)  # w' of the last kick
+        self._square = zeros(4)
+
+    def set_properties(self, body: int, properties: MassProperties) -> None:
+        """Give a body other constants while its origin moves on undisturbed, as if something came or went unfelt."""
+        point, velocity = self.origin(body), self.origin_velocity(body)
+        x, y, z = self._arm[:, body] = properties.com
+        self._arm_cross[..., body] = ((0.0, z, -y), (-z, 0.0, x), (y, -x, 0.0))
+        self._inverse_mass[body] = 1.0 / properties.mass
+        self._inertia[..., body] = properties.inertia
+        self._inverse_inertia[..., body] = np.linalg.inv(properties.inertia)
+        self.com[:, body] += point - self.origin(body)
+        self.com_velocity[:, body] += velocity - self.origin_velocity(body)
+
+    def place(self, body: int, origin: Vector) -> None:
+        """Put an upright body with its origin at a point (m), at rest."""
+        self.quat_xyzw[:, body] = (0.0, 0.0, 0.0, 1.0)
+        self.rot[..., body] = np.eye(3)
+        self.rates[:, body] = self.com_velocity[:, body] = self._acceleration[:, body] = 0.0
+        self.com[:, body] = np.add(origin, self._arm[:, body])
+
+    def origin(self, bodies: int | slice = ALL) -> Array:
+        """Positions of the bodies' origins (3, n) (m), world axes."""
+        return self.com[:, bodies] - times(self.rot[..., bodies], self._arm[:, bodies])
+
+    def origin_velocity(self, bodies: int | slice = ALL) -> Array:
+        """Velocities of the bodies' origins (3, n) (m/s), world axes."""
+        across = times(self._arm_cross[..., bodies], self.rates[:, bodies])  # w x arm
+        return self.com_velocity[:, bodies] - times(self.rot[..., bodies], across)
+
+    def drift(self, duration: float) -> None:
+        """Move along the velocities for `duration` (s)."""
+        self.com += duration * self.com_velocity
+        turn = duration * self.rates
+        square = turn * turn
+        square = square[0] + square[1] + square[2]
+        turn *= 0.5 + square * (1 / 24)  # the series of tan(|turn| / 2) / |turn|
+        vector, scalar = self.quat_xyzw[:3], self.quat_xyzw[3]
+        along = vector * turn
+        vector += scalar * turn + cross(vector, turn)
+        scalar -= along[0] + along[1] + along[2]
+        square = np.multiply(self.quat_xyzw, self.quat_xyzw, out=self._square)
+        self.quat_xyzw *= 1.0 / np.sqrt(square[0] + square[1] + square[2] + square[3])
+        self._update_rot()
+
+    def kick(self, duration: float, force: Array, torque: Array) -> None:
+        """Change velocities by a `force` (3, n) (N, world axes) and a `torque` (3, n) (Nm, body axes) at the origin."""
+        self.com_velocity += force * (duration * self._inverse_mass)
+        self.com_velocity[2] -= duration * GRAVITY
+        middle = self.rates + (0.5 * duration) * self._acceleration
+        about_com = torque + times(self._arm_cross, transposed_times(self.rot, force))  # - arm x force
+        about_com -= cross(middle, times(self._inertia, middle))
+        self._acceleration = times(self._inverse_inertia, about_com)
+        self.rates += duration * self._acceleration
+
+    def _update_rot(self) -> None:
+        x, y, z, w = self.quat_xyzw
+        rot = self.rot
+        twice = self.quat_xyzw[:3] + self.quat_xyzw[:3]
+        (xx, xy, xz), (yy, yz), zz = x * twice, y * twice[1:], z * twice[2]
+        wx, wy, wz = w * twice
+        np.subtract(1.0, yy + zz, out=rot[0, 0])
+        np.subtract(1.0, xx + zz, out=rot[1, 1])
+        np.subtract(1.0, xx + yy, out=rot[2, 2])
+        np.subtract(xy, wz, out=rot[0, 1])
+        np.subtract(yz, wx, out=rot[1, 2])
+        np.subtract(xz, wy, out=rot[2, 0])
+        np.add(xy, wz, out=rot[1, 0])
+        np.add(yz, wx, out=rot[2, 1])
+        np.add(xz, wy, out=rot[0, 2])
+
+
+def times(matrices: Array, vectors: Array) -> Array:
+    """Matrices (3, 3, ...) times vectors (3, ...), body by body; the order of the sum is fixed."""
+    products = matrices * vectors
+    out = products[:, 0] + products[:, 1]
+    out += products[:, 2]
+    return out
+
+
+def transposed_times(matrices: Array, vectors: Array) -> Array:
+    """Transposed matrices (3, 3, ...) times vectors (3, ...), likewise."""
+    products = matrices * vectors[:, None]
+    out = products[0] + products[1]
+    out += products[2]
+    return out
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Cross products of vectors (3, ...), body by body."""
+    return a.take(_NEXT, 0) * b.take(_LAST, 0) - a.take(_LAST, 0) * b.take(_NEXT, 0)

@@ -1,0 +1,190 @@
+"""Episodes in batches: as one environment at a time has them, whatever the chunks and the workers."""
+
+from __future__ import annotations
+
+import importlib
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from artde_gym.cli import app
+from artde_gym.errors import DisturbanceError, OptionError
+from artde_gym.evaluation import Result, evaluate
+from artde_gym.evaluation.evaluate import Update, _chunks
+
+HARNESS = importlib.import_module("artde_gym.evaluation.evaluate")  # the package has the function by this name
+QUADROTOR = "QuadInfinity-Payload-v0"
+WINDY: dict[str, Any] = {
+    "payload": {"mass": {"uniform": [0.33, 0.37]}, "position": [0.01, 0.0, -0.1], "drop": 1.5},
+    "push": [{"body": "body", "magnitude": {"uniform": [0.5, 2.0]}, "start": 0.5}],
+    "wind": 1.0,
+    "ground_effect": 1.0,
+    "initial_position": {"offset": [{"uniform": [-0.005, 0.005]}] * 3},
+}
+FAILING = {"actuator_loss": [{"joint": "front_left", "start": {"uniform": [0.2, 3.0]}}]}
+"""A rotor stops at some time; some of the vehicles crash before the end."""
+TOLERANCES = {"_m": 5e-4, "_deg": 0.05, "rms_thrust": 0.01, "rms_torque": 1e-3, "recovery_time": 0.02}
+
+
+def fly(backend: Any = "batch", disturbances: Any = WINDY, duration: float = 2.4, **kwargs: Any) -> Result:
+    kwargs = {"controllers": ["artde"], "episodes": 7, "env_kwargs": {"duration": duration}, **kwargs}
+    return evaluate(kwargs.pop("controllers"), QUADROTOR, backend=backend, disturbances=disturbances, **kwargs)
+
+
+def same(one: Result, other: Result) -> None:
+    pd.testing.assert_frame_equal(one.episodes, other.episodes, check_exact=True, check_dtype=False)
+
+
+def test_batch_is_single_within_the_physics() -> None:
+    single: Any
+    batch: Any
+    single, batch = (fly(backend, episodes=4).episodes for backend in ("single", "batch"))
+    assert set(single) == set(batch)
+    drawn = [name for name in single if name.startswith("disturbance.")]
+    assert len(drawn) > 15
+    pd.testing.assert_frame_equal(
+        single[[*drawn, "seed"]], batch[[*drawn, "seed"]], check_exact=True, check_dtype=False
+    )
+    assert single["disturbance.payload.mass"].nunique() == 4
+    compared = 0
+    for name in single.columns.difference(drawn):
+        for part, tolerance in TOLERANCES.items():
+            if part in name:
+                np.testing.assert_allclose(batch[name], single[name], rtol=0, atol=tolerance, err_msg=name)
+                compared += 1
+    assert compared > 20
+    assert single["rmse_m"].min() > 1e-3
+    assert np.isfinite(single["peak_error_m_drop"]).all()
+    np.testing.assert_allclose(batch["energy_j"], single["energy_j"], rtol=1e-3)
+    np.testing.assert_allclose(batch["reward"], single["reward"], rtol=1e-3)
+
+
+def test_crashes_are_those_of_single() -> None:
+    single: Any
+    batch: Any
+    single, batch = (fly(backend, FAILING, controllers=["pid"]).episodes for backend in ("single", "batch"))
+    assert 0 < single["fell"].sum() < 7
+    assert single["fell"].tolist() == batch["fell"].tolist()
+    assert single["fall_reason"].tolist() == batch["fall_reason"].tolist()
+    np.testing.assert_allclose(batch["time_to_fall_s"], single["time_to_fall_s"], atol=0.031)
+    np.testing.assert_allclose(batch["rmse_m_x"], single["rmse_m_x"], atol=2e-3)
+
+
+@pytest.mark.parametrize("disturbances", [WINDY, FAILING], ids=["windy", "failing"])
+def test_chunks_and_workers_do_not_change_a_bit(disturbances: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = fly(disturbances=disturbances, controllers=["artde", "asmc"])
+    for size, workers in ((1, 1), (3, 1), (4, 2)):
+        monkeypatch.setattr(HARNESS, "CHUNK", size)
+        same(whole, fly(disturbances=disturbances, controllers=["artde", "asmc"], workers=workers))
+
+
+def test_more_episodes_leave_the_first_ones_as_they_were() -> None:
+    few: Any
+    many: Any
+    few, many = (fly(episodes=episodes, duration=0.5).episodes for episodes in (5, 1100))  # two of the vector's fleets
+    pd.testing.assert_frame_equal(few, many[:5], check_exact=True)
+
+
+def test_interruption_and_continuation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(HARNESS, "CHUNK", 3)
+
+    def interrupt(update: Update) -> None:
+        if update.finished >= 5:
+            raise KeyboardInterrupt
+
+    whole = fly(controllers=["tde", "artde"], out=tmp_path / "whole")
+    part = fly(controllers=["tde", "artde"], out=tmp_path / "part", on_progress=interrupt)
+    assert not part.complete
+    assert 0 < len(part.episodes) < len(whole.episodes)
+    monkeypatch.setattr(HARNESS, "CHUNK", 2048)  # what is left may come in other chunks
+    resumed = fly(controllers=["tde", "artde"], out=tmp_path / "part")
+    assert resumed.complete
+    same(resumed, whole)
+    assert (tmp_path / "part" / "episodes.csv").read_bytes() == (tmp_path / "whole" / "episodes.csv").read_bytes()
+    assert not (tmp_path / "part" / "traces").exists()
+
+
+def test_traces_of_the_first_episodes_on_request(tmp_path: Path) -> None:
+    fly("single", out=tmp_path / "single", traced=1, episodes=2, duration=0.9)
+    fly("batch", out=tmp_path / "batch", traced=2, episodes=3, duration=0.9)
+    folder = tmp_path / "batch" / "traces" / "custom"
+    assert sorted(path.name for path in folder.iterdir()) == ["artde-0.npz", "artde-1.npz"]
+    assert [path.name for path in (tmp_path / "single" / "traces" / "custom").iterdir()] == ["artde-0.npz"]
+    single, batch = (
+        np.load(tmp_path / backend / "traces" / "custom" / "artde-0.npz") for backend in ("single", "batch")
+    )
+    assert set(single) == set(batch)
+    for name in single:
+        assert single[name].shape == batch[name].shape, name
+    assert batch["position"].shape == (61, 3)
+    assert batch["policy.attitude_error"].shape == (60, 3)  # no decision at the end
+    np.testing.assert_allclose(batch["position"], single["position"], atol=5e-4)
+
+
+def test_traces_end_with_the_crash(tmp_path: Path) -> None:
+    result = fly(disturbances=FAILING, controllers=["pid"], out=tmp_path, traced=7, trace_hz=20.0)
+    for episode, time in zip(result.episodes["episode"], result.episodes["duration_s"], strict=True):
+        traces = np.load(tmp_path / "traces" / "custom" / f"pid-{episode}.npz")
+        assert time - 0.045 < traces["time"][-1] <= time + 1e-9
+        assert len(traces["time"]) == len(traces["position"])
+
+
+def test_progress_counts_episodes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(HARNESS, "CHUNK", 4)
+    seen: list[Update] = []
+    fly(on_progress=seen.append)
+    ended = [update.finished for update in seen if update.ended]
+    assert ended == [3, 7]
+    assert {update.total for update in seen} == {7}
+    assert any(0 < update.time_s < 2.4 for update in seen)
+
+
+def test_chunks_cover_all_evenly() -> None:
+    for episodes in (1, 7, 2048, 2049, 10_000):
+        chunks = _chunks(episodes, 2048)
+        assert [i for chunk in chunks for i in chunk] == list(range(episodes))
+        sizes = {len(chunk) for chunk in chunks}
+        assert max(sizes) <= 2048
+        assert max(sizes) - min(sizes) <= 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "words"),
+    [
+        ({"env_id": "BipedPush-v0"}, OptionError, ["batch backend", "BipedPush-v0", QUADROTOR]),
+        ({"backend": "bach"}, OptionError, ["backend", "bach", "did you mean 'batch'"]),
+        ({"traced": -1}, OptionError, ["traced", "-1"]),
+        ({"env_kwargs": {"engine": "bullet"}}, OptionError, ["engine", "dtype"]),
+        ({"env_kwargs": {"num_envs": 3}}, OptionError, ["num_envs", "duration"]),
+        ({"env_kwargs": {"dtype": "float16"}}, OptionError, ["dtype", "float16"]),
+        ({"disturbances": {"wind": -1.0}}, DisturbanceError, ["wind.scale", "-1"]),
+    ],
+)
+def test_bad_arguments_are_refused_before_the_first_episode(
+    arguments: dict[str, Any], error: type[Exception], words: list[str], tmp_path: Path
+) -> None:
+    given = {"env_id": QUADROTOR, "backend": "batch", "out": tmp_path / "run", **arguments}
+    with pytest.raises(error) as caught:
+        evaluate(["artde"], episodes=1, **given)
+    for word in words:
+        assert word in str(caught.value)
+    assert not (tmp_path / "run").exists()
+
+
+def test_command_prints_table_31_beside_ours(tmp_path: Path) -> None:
+    arguments = ["evaluate", "--env", QUADROTOR, "--controllers", "tde,atde,artde,asmc", "--backend", "batch"]
+    arguments += ["--episodes", "2", "--workers", "1", "--out", str(tmp_path / "run")]
+    outcome = CliRunner().invoke(app, [*arguments, "--env-kwargs", json.dumps({"duration": 0.6})])
+    assert outcome.exit_code == 0, outcome.output
+    for word in ("Q1: infinity", "Q1-calm", "Q1-gale", "Table 3.1", "RMS error (m)", "15.320", "psi", "all"):
+        assert word in outcome.output
+    assert outcome.output.count("Table 3.1") == 2  # there was a fan in the thesis
+    folder = tmp_path / "run"
+    record = json.loads((folder / "summary.json").read_text())
+    assert record["configuration"]["backend"] == "batch"
+    assert len(pd.read_csv(folder / "episodes.csv")) == 2 * 4 * 3
