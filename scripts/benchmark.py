@@ -7,6 +7,7 @@ make benchmark ARGS="--steps 1000000"       memory over a million steps too, som
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import json
 import statistics
 import time
@@ -23,6 +24,7 @@ import controllers
 WALK = 5900  # steps: two seconds of standing, two steps, standing again
 TURN = 50  # steps
 RESETS = 200
+MUJOCO = importlib.util.find_spec("mujoco") is not None  # an extra: its figures are left out without it
 
 
 def main() -> None:
@@ -44,6 +46,8 @@ def walking() -> dict[str, float]:
     time is the median of its turns, which a burst of other work on the machine does not move.
     """
     loops = {"tde": ClosedLoop("tde"), "artde": ClosedLoop("artde")}
+    if MUJOCO:
+        loops |= {"artde, mujoco": ClosedLoop("artde", engine="mujoco")}
     replays = {"environment": EnvironmentAlone(), "bare": BareEngine()}
     turns: dict[str, list[float]] = {name: [] for name in (*loops, *replays)}
     for _ in range(WALK // TURN):
@@ -58,19 +62,23 @@ def walking() -> dict[str, float]:
                 replay.step(torque)
             turns[name].append(time.perf_counter() - start)
     times = {name: statistics.median(durations) for name, durations in turns.items()}
-    return {
+    figures = {
         "bare engine (us a step)": 1e6 * times["bare"] / TURN,
         "env.step / bare engine (rate, >= 0.85)": times["bare"] / times["environment"],
         "closed loop TDE / bare engine (rate)": times["bare"] / times["tde"],
         "closed loop ARTDE / bare engine (>= 0.75)": times["bare"] / times["artde"],
     }
+    if MUJOCO:
+        figures["closed loop ARTDE in MuJoCo (us a step)"] = 1e6 * times["artde, mujoco"] / TURN
+        figures["the same / in Bullet (rate, >= 3)"] = times["artde"] / times["artde, mujoco"]
+    return figures
 
 
 class ClosedLoop:
     """A controller drives the environment; `torques` remembers how."""
 
-    def __init__(self, name: str) -> None:
-        self.env = make()
+    def __init__(self, name: str, **kwargs: Any) -> None:
+        self.env = make(**kwargs)
         self.policy = controllers.make(name, self.env)
         self.observation, _ = self.env.reset(seed=0)
         self.state = None

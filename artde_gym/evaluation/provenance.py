@@ -10,7 +10,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-PACKAGES = ("artde-gym", "gymnasium", "numpy", "scipy", "pandas", "pybullet", "torch", "stable-baselines3")
+PACKAGES = ("artde-gym", "gymnasium", "numpy", "scipy", "pandas", "pybullet", "mujoco", "torch", "stable-baselines3")
 
 
 def provenance() -> dict[str, Any]:
