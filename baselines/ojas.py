@@ -46,8 +46,8 @@ RANGES: dict[str, float] = {
 """What a component of the action is, in the mirror, and its largest size."""
 FILTER_RATE = 25.0  # rad/s
 K_P, K_D = 25.0, 10.0  # of the error dynamics that the thesis asks for
-OPENS_TILT = (0.06, 0.12)  # rad, where the gate begins to open, and where it is open
-OPENS_SPEED = (0.12, 0.25)  # m/s, likewise
+OPENS_TILT = (0.03, 0.08)  # rad, where the gate begins to open, and where it is open; a walk without pushes: 0.016
+OPENS_SPEED = (0.08, 0.16)  # m/s, likewise; a walk without pushes: 0.055
 CLOSING = 0.5  # s, time constant of the closing gate
 DIFFERENCE = 1e-4  # s, of the reference velocity's difference quotient
 
