@@ -22,7 +22,7 @@ PASSED_ON = (
     "rotor_thrust",
 )
 """Fields of the observation that the agent sees as they are."""
-NEAR = 0.05  # m, an error that costs one unit of reward
+NEAR = 0.02  # m, an error that costs one unit of reward
 
 
 class Q450Memory(NamedTuple):
@@ -40,7 +40,7 @@ class Q450Coupling:
         gains: of the base's position loop, for s; None without one.
     """
 
-    reward_scales: ClassVar[Mapping[str, float]] = {"alive": 1.0, "position": -1.0, "residual": -0.01, "fall": -100.0}
+    reward_scales: ClassVar[Mapping[str, float]] = {"alive": 1.0, "position": -1.0, "residual": -0.01, "fall": -200.0}
 
     def __init__(self, plant: Plant, recipe: Recipe, gains: Any) -> None:
         torque = recipe.base == NO_BASE
