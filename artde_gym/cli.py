@@ -20,6 +20,7 @@ from artde_gym.errors import ArtdeGymError, OptionError, among
 from artde_gym.evaluation import SCENARIOS
 from artde_gym.evaluation import evaluate as run_evaluation
 from artde_gym.evaluation import frontier as run_frontier
+from artde_gym.evaluation import tune as run_tuning
 from artde_gym.evaluation.claims import CLAIMS, judge
 from artde_gym.evaluation.console import print_claims, print_result
 from artde_gym.evaluation.environments import ours
@@ -27,6 +28,7 @@ from artde_gym.evaluation.evaluate import Update
 from artde_gym.evaluation.frontier_console import print_frontier
 from artde_gym.evaluation.frontier_standard import STANDARDS
 from artde_gym.evaluation.scenarios import scenario as find_scenario
+from artde_gym.evaluation.tune_console import print_tuning
 from artde_gym.registration import registered_controllers
 from controllers import GainError
 
@@ -158,6 +160,50 @@ def frontier(
             on_progress=lambda value, update: display(update, f"{vary} {value:g}"),
         )
     print_frontier(found, console)
+    if not found.complete:
+        raise typer.Exit(130)
+
+
+@app.command()
+def tune(
+    controllers: Annotated[str, typer.Option(help="Names, comma-separated; see `list`.")] = "tde,atde,artde",
+    scenario: Annotated[str | None, typer.Option(help="Name; see `list`. Default: none, with --env as it is.")] = None,
+    env: Annotated[str | None, typer.Option(help=f"Environment id. Default: the scenario's, or {WALK}.")] = None,
+    trials: Annotated[int, typer.Option(help="Sets of gains that each controller may try, its preset included.")] = 50,
+    episodes: Annotated[int, typer.Option(help="Seeded training episodes of each trial.")] = 4,
+    held_out: Annotated[
+        int, typer.Option(help="Seeded episodes of the comparison in the end, none of them seen.")
+    ] = 20,
+    seed: Annotated[int, typer.Option(help="Seed of everything.")] = 0,
+    workers: Annotated[int | None, typer.Option(help="Processes. Default: all cores.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Results folder. Default: runs/<date and time>.")] = None,
+    backend: Annotated[str, typer.Option(help="single or batch, as of `evaluate`.")] = "single",
+    engine: Annotated[str | None, typer.Option(help="Physics engine.")] = None,
+    disturbances: Annotated[str | None, typer.Option(help="JSON, in place of the scenario's own.")] = None,
+    env_kwargs: Annotated[str | None, typer.Option(help="JSON, arguments of the environment.")] = None,
+) -> None:
+    """Tune gains with the same budget for every controller; the same command continues an interrupted run."""
+    kwargs = _json("--env-kwargs", env_kwargs)
+    if engine is not None:
+        kwargs["engine"] = engine
+    console = Console()
+    with Display(console) as display:
+        found = run_tuning(
+            _names(controllers),
+            env,
+            scenario=scenario,
+            trials=trials,
+            episodes=episodes,
+            held_out=held_out,
+            seed=seed,
+            workers=workers or os.cpu_count() or 1,
+            out=out or Path("runs") / datetime.datetime.now().strftime("%Y-%m-%d-%H%M%S"),
+            disturbances=_json("--disturbances", disturbances) if disturbances is not None else None,
+            env_kwargs=kwargs,
+            backend=backend,  # pyright: ignore[reportArgumentType]  # checked there
+            on_progress=lambda what, update: display(update, what),
+        )
+    print_tuning(found, console)
     if not found.complete:
         raise typer.Exit(130)
 

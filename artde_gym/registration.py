@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import dataclasses
 import importlib
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
 import gymnasium as gym
 
@@ -17,18 +17,32 @@ from artde_gym.errors import UnknownNameError, among
 
 @dataclasses.dataclass(frozen=True)
 class ControllerSpec:
-    """A controller by name: `entry_point` is "module:function", called as function(env, **kwargs)."""
+    """A controller by name: `entry_point` is "module:function", called as function(env, **kwargs).
+
+    `search`, in the same form and called the same way, gives the gains that tuning may change; None if there are none.
+    """
 
     name: str
     entry_point: str
     kwargs: Mapping[str, Any]
     text: str
+    search: str | None = None
+
+
+class GainRange(NamedTuple):
+    """Where to look for a gain: from `start`, between `low` and `high`, on a logarithmic scale; all above zero."""
+
+    start: float
+    low: float
+    high: float
 
 
 _controllers: dict[str, ControllerSpec] = {}
 
 
-def register_controller(name: str, entry_point: str, *, text: str = "", **kwargs: Any) -> None:
+def register_controller(
+    name: str, entry_point: str, *, text: str = "", search: str | None = None, **kwargs: Any
+) -> None:
     """Make `name` known to `controllers.make`, to `evaluate` and to the command line.
 
     Args:
@@ -36,14 +50,17 @@ def register_controller(name: str, entry_point: str, *, text: str = "", **kwargs
         entry_point: "module:function"; the function is called as function(env, **kwargs, **overrides) and returns a
             policy with Stable-Baselines3's `predict`.
         text: one line for listings.
+        search: "module:function" for `artde-gym tune`; called as function(env, **kwargs), it returns a mapping from
+            gains to `GainRange`.
         kwargs: fixed arguments of the function.
 
     Raises:
-        UnknownNameError: if the entry point is not of that form.
+        UnknownNameError: if an entry point is not of that form.
     """
-    if entry_point.count(":") != 1:
-        raise UnknownNameError("entry_point", entry_point, '"module:function"')
-    register_spec(ControllerSpec(name, entry_point, dict(kwargs), text))
+    for field, point in (("entry_point", entry_point), ("search", search)):
+        if point is not None and point.count(":") != 1:
+            raise UnknownNameError(field, point, '"module:function"')
+    register_spec(ControllerSpec(name, entry_point, dict(kwargs), text, search))
 
 
 def register_spec(spec: ControllerSpec) -> None:
@@ -62,11 +79,32 @@ def make_controller(name: str, env: Any, **overrides: Any) -> Any:
     Raises:
         UnknownNameError: if no controller has this name.
     """
-    known = _controllers.get(name)
-    if known is None:
+    known = _known(name)
+    return _resolved(known.entry_point)(env, **{**known.kwargs, **overrides})
+
+
+def search_space(name: str, env: Any) -> dict[str, GainRange]:
+    """The gains of the controller called `name` that tuning may change, for the robot of an environment.
+
+    Raises:
+        UnknownNameError: if no controller has this name, or if nobody said where to look for its gains.
+    """
+    known = _known(name)
+    if known.search is None:
+        tunable = [other for other, spec in _controllers.items() if spec.search is not None]
+        raise UnknownNameError("controller to be tuned", name, among(name, tunable))
+    return dict(_resolved(known.search)(env, **known.kwargs))
+
+
+def _known(name: str) -> ControllerSpec:
+    if name not in _controllers:
         raise UnknownNameError("controller", name, among(name, _controllers))
-    module, function = known.entry_point.split(":")
-    return getattr(importlib.import_module(module), function)(env, **{**known.kwargs, **overrides})
+    return _controllers[name]
+
+
+def _resolved(entry_point: str) -> Callable[..., Any]:
+    module, function = entry_point.split(":")
+    return getattr(importlib.import_module(module), function)
 
 
 def register_all() -> None:
@@ -78,19 +116,29 @@ def register_all() -> None:
         entry_point="artde_gym.envs.quadrotor:QuadInfinityPayloadEnv",
         vector_entry_point="artde_gym.envs.quadrotor_batch:QuadInfinityPayloadVectorEnv",
     )
-    law = "controllers.robots:make_for_robot"
-    register_controller("tde", law, law="tde", text="time-delay estimation")
-    register_controller("atde", law, law="atde", text="TDE + one adaptive gain")
-    register_controller("artde", law, law="artde", text="TDE + adaptive-robust term, as printed in the thesis")
-    register_controller("artde-robust", law, law="artde", preset="robust", text="ARTDE with bounded gains")
-    register_controller("pid", law, law="pid", text="PID; biped: equal to TDE, quadrotor: a tuned cascade")
-    register_controller("tde+c", law, law="tde+c", text="TDE + robust term of constant gain (ablation)")
-    register_controller("tde+kd", law, law="tde+kd", text="TDE at the stiffer gains equivalent to it (ablation)")
-    register_controller("asmc", law, law="asmc", text="quadrotor: adaptive sliding mode (a law of ours)")
-    register_controller("indi", law, law="indi", text="quadrotor: incremental nonlinear dynamic inversion")
-    register_controller("geometric", law, law="geometric", text="quadrotor: geometric control on SE(3), with integral")
+    register_laws()
+
+
+def register_laws() -> None:
+    """Register the controllers that this project brings."""
+
+    def law(name: str, text: str, **kwargs: Any) -> None:
+        search = "controllers.robots:search_space"
+        register_controller(name, "controllers.robots:make_for_robot", text=text, search=search, **kwargs)
+
+    law("tde", "time-delay estimation", law="tde")
+    law("atde", "TDE + one adaptive gain", law="atde")
+    law("artde", "TDE + adaptive-robust term, as printed in the thesis", law="artde")
+    law("artde-robust", "ARTDE with bounded gains", law="artde", preset="robust")
+    law("pid", "PID; biped: equal to TDE, quadrotor: a tuned cascade", law="pid")
+    law("tde+c", "TDE + robust term of constant gain (ablation)", law="tde+c")
+    law("tde+kd", "TDE at the stiffer gains equivalent to it (ablation)", law="tde+kd")
+    law("asmc", "quadrotor: adaptive sliding mode (a law of ours)", law="asmc")
+    law("indi", "quadrotor: incremental nonlinear dynamic inversion", law="indi")
+    law("geometric", "quadrotor: geometric control on SE(3), with an integral", law="geometric")
     register_controller(
         "computed-torque",
         "controllers.model_based:make_computed_torque",
         text="biped: feedback linearisation with the nominal model (upper reference)",
+        search="controllers.model_based:search_space",
     )

@@ -1,4 +1,9 @@
-"""An agent on the quadrotor: it adds an acceleration (world axes) to the one that the position loop asks for."""
+"""An agent on the quadrotor: it adds to the accelerations that the two loops of a cascade ask for.
+
+Channel "cascade": du_p = limit x [x, y, z] (m/s^2, world axes) in the position loop, and
+du_q = TURNING limit x [roll, pitch, yaw] (rad/s^2, body axes) in the attitude loop. Channel "position": du_p alone. At
+the thesis' gains the attitude loop is the slow one, and a residual that cannot quicken it has little to gain.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +18,8 @@ from controllers.laws.tracking import Array, sliding_variable
 from controllers.policies import Plant
 
 AXES = ("x", "y", "z")
+TURNS = ("roll", "pitch", "yaw")
+TURNING = 5.0  # limit of the attitude's du over the position's (rad/m)
 PASSED_ON = (
     "rot_body_to_world",
     "body_rates",
@@ -32,7 +39,7 @@ class Q450Memory(NamedTuple):
 
 
 class Q450Coupling:
-    """du = limit x action, for the three axes of the position; without a base, the action is the wrench.
+    """The coupling at the top; without a base, the action is the wrench.
 
     Args:
         plant: of the environment.
@@ -44,9 +51,16 @@ class Q450Coupling:
 
     def __init__(self, plant: Plant, recipe: Recipe, gains: Any) -> None:
         torque = recipe.base == NO_BASE
-        self.actions = ("u1", "u2", "u3", "u4") if torque else AXES
-        self._limit: Any = np.ptp([plant.action.box().low, plant.action.box().high], axis=0) / 2 if torque else None
-        self._limit = self._limit if torque else recipe.limit
+        if torque:
+            self.actions = ("u1", "u2", "u3", "u4")
+            box = plant.action.box()
+            self._limit = (box.high - box.low) / 2
+        elif recipe.channel == "position":
+            self.actions = AXES
+            self._limit = np.full(3, recipe.limit)
+        else:
+            self.actions = AXES + TURNS
+            self._limit = recipe.limit * np.repeat([1.0, TURNING], 3)
         loop = getattr(gains, "position", None)
         self._gains = (loop.k_p, loop.k_d) if hasattr(loop, "k_p") else None
         self._at = plant.observation.slices
@@ -58,6 +72,8 @@ class Q450Coupling:
                 Field("s", 3, "m", -10.0, 10.0, "the base's sliding variable"),
                 Field("sigma_p", 3, "m/s^2", -100.0, 100.0, "TDE error of the position loop, a sample ago"),
                 Field("sigma_q", 3, "rad/s^2", -1e3, 1e3, "TDE error of the attitude loop, a sample ago"),
+                Field("attitude_error", 3, "rad", -4.0, 4.0, "desired minus actual roll, pitch, yaw, a sample ago"),
+                Field("force_command", 3, "N", -100.0, 100.0, "of the position loop, a sample ago, world axes"),
                 Field("c", 1, "m/s^2", 0.0, 100.0, "gain of the position loop's robust term"),
                 *own,
                 Field("action", len(self.actions), "1", -1.0, 1.0, "of the agent, a decision ago"),
@@ -82,6 +98,8 @@ class Q450Coupling:
             s,
             inside.get("sigma_p", nothing),
             inside.get("sigma_q", nothing),
+            inside.get("attitude_error", nothing),
+            inside.get("force_command", nothing),
             nothing[..., :1] if c is None else c[..., None],
             *(observation[..., part] for part in self._own),
             memory.action,
@@ -92,7 +110,7 @@ class Q450Coupling:
         return Q450Memory(np.minimum(np.maximum(action, -1.0), 1.0).astype(memory.action.dtype))
 
     def advance(self, memory: Q450Memory) -> tuple[Array, Q450Memory]:
-        return self._limit * memory.action, memory
+        return (self._limit * memory.action).astype(memory.action.dtype, copy=False), memory
 
     def reward_terms(self, observation: Array, action: Array, fell: Any) -> dict[str, Array]:
         e, _ = self._errors(observation)

@@ -75,15 +75,19 @@ class Residual:
         """Memory with a new action (..., n_actions)."""
         return memory._replace(coupling=self.coupling.decide(memory.coupling, action))
 
-    def control(self, observation: Array, memory: ResidualMemory) -> tuple[Array, ResidualMemory]:
-        """The force for one control period, within the actuators' bounds, and memory."""
+    def control(
+        self, observation: Array, memory: ResidualMemory, more: Array | None = None
+    ) -> tuple[Array, ResidualMemory]:
+        """The force for one control period, within the actuators' bounds, and memory; `more` is added to du."""
         du, coupling = self.coupling.advance(memory.coupling)
+        if more is not None:
+            du = du + more
         force, base = self.base.predict(observation, memory.base, residual=du)
         return force, ResidualMemory(base, coupling)
 
 
 class PolicyMemory(NamedTuple):
-    """Of the residual, the control periods since the last decision (...), and du of the last one (..., n)."""
+    """Of the residual, and the control periods since the last decision (...)."""
 
     residual: ResidualMemory
     count: NDArray[np.int64]
@@ -102,26 +106,24 @@ class ResidualPolicy(Policy):
     def __init__(self, name: str, plant: Plant, residual: Residual, actor: Callable[[Array], Array]) -> None:
         super().__init__(name, plant, residual.base.gains)
         self.residual, self.actor = residual, actor
-        self._acceleration = plant.observation[ACCELERATION[plant.robot]]
 
-    def read(self, observation: Array) -> Array:
-        return observation
+    def read(self, observation: Array) -> _Signals:
+        return _Signals(observation, None)
 
-    def accelerated(self, signals: Array, du: Array) -> Array:
-        given = signals.copy()
-        given[..., self._acceleration] += du
-        return given
+    def accelerated(self, signals: _Signals, du: Array) -> _Signals:
+        return signals._replace(du=du)
 
-    def start(self, signals: Array) -> Memory:
-        return PolicyMemory(self.residual.start(signals), np.zeros(signals.shape[:-1], np.int64))
+    def start(self, signals: _Signals) -> Memory:
+        observation = signals.observation
+        return PolicyMemory(self.residual.start(observation), np.zeros(observation.shape[:-1], np.int64))
 
-    def step(self, memory: Any, signals: Array, observation: Array) -> tuple[Array, Memory]:
+    def step(self, memory: Any, signals: _Signals, observation: Array) -> tuple[Array, Memory]:
         residual, due = memory.residual, memory.count == 0
         if due.any():
             features, seen = self.residual.observe(observation, residual)
             decided = self.residual.decide(seen, self.actor(features))
             residual = decided if due.all() else choose(due, decided, residual)
-        force, residual = self.residual.control(signals, residual)
+        force, residual = self.residual.control(observation, residual, signals.du)
         return force, PolicyMemory(residual, (memory.count + 1) % self.residual.periods)
 
     def diagnostics(self, state: Any) -> dict[str, Array]:
@@ -132,8 +134,11 @@ class ResidualPolicy(Policy):
         return {**self.residual.base.diagnostics(memory.residual.base), **own}
 
 
-ACCELERATION = {"ojas": "qdd_ref", "q450": "acceleration_ref"}
-"""Field of the observation to which du belongs, by robot."""
+class _Signals(NamedTuple):
+    """The observation, and the du (..., n) of whoever uses a policy with a residual as a base."""
+
+    observation: Array
+    du: Array | None
 
 
 class NoBase(Policy):

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from artde_gym.registration import GainRange
 from artde_gym.robots.support import Supported
 from controllers.law_table import Nothing
 from controllers.laws.computed_torque import ComputedTorqueGains, computed_torque
 from controllers.laws.tracking import Array, Memory, Signals
 from controllers.policies import Plant, TrackingPolicy
-from controllers.presets import preset_gains
+from controllers.presets import gain_ranges, preset_gains
 
 
 class ComputedTorquePolicy(TrackingPolicy):
@@ -43,3 +44,8 @@ def make_computed_torque(env: Any, *, preset: str | None = None, **gains: Any) -
     """
     plant = Plant.of(env)
     return ComputedTorquePolicy(plant, preset_gains(plant.robot, "computed-torque", preset, plant.action.size, gains))
+
+
+def search_space(env: Any) -> dict[str, GainRange]:
+    """Where tuning may look for the gains."""
+    return gain_ranges(Plant.of(env).robot, "computed-torque", None)

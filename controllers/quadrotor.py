@@ -60,7 +60,9 @@ class QuadrotorPolicy(Policy):
         )
 
     def accelerated(self, signals: Flight, du: Array) -> Flight:
-        return signals._replace(acceleration_ref=signals.acceleration_ref + du)
+        """Of the position, and of the attitude if `du` (..., 6) goes on with it (rad/s^2, body axes)."""
+        position = signals.acceleration_ref + du[..., :AXES]
+        return signals._replace(acceleration_ref=position, turning_ref=du[..., AXES:] if du.shape[-1] > AXES else None)
 
     def start(self, signals: Flight) -> Memory:
         return cascade_start(self._position, self._attitude, self.gains, signals, self._period)

@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from artde_gym.errors import UnknownNameError, among
+from artde_gym.registration import GainRange
 from controllers.policies import Plant, Policy, make_law
+from controllers.presets import gain_ranges
 from controllers.quadrotor import make_quadrotor
 
 _MAKERS = {"ojas": make_law, "q450": make_quadrotor}
@@ -27,3 +29,12 @@ def make_for_robot(env: Any, *, law: str, **options: Any) -> Policy:
     if robot not in _MAKERS:
         raise UnknownNameError("robot", robot, among(robot, _MAKERS))
     return _MAKERS[robot](env, law=law, **options)
+
+
+def search_space(env: Any, *, law: str, preset: str | None = None) -> dict[str, GainRange]:
+    """Where tuning may look for the gains of a law for the robot of an environment.
+
+    Raises:
+        UnknownNameError: for a law or preset that the robot does not have, or a law whose gains nobody tunes.
+    """
+    return gain_ranges(Plant.of(env).robot, law, preset)

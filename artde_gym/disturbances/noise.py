@@ -23,9 +23,9 @@ _SHIFTS = tuple(np.uint64(bits) for bits in (30, 27, 31, 11))
 _TO_UNIT_VARIANCE = math.sqrt(12.0 / (2.0**32 - 1.0))  # of the 2^16 values of a uniform integer
 
 
-def draw_key(rng: np.random.Generator) -> int:
-    """The key of a new stream."""
-    return int(rng.integers(2**64, dtype=np.uint64))
+def draw_keys(rng: np.random.Generator, count: int) -> Integers:
+    """Keys of so many new streams."""
+    return rng.integers(2**64, size=count, dtype=np.uint64)
 
 
 def uniform_noise(keys: Integers, index: Integers, dtype: DTypeLike = np.float64) -> Array:
@@ -40,12 +40,9 @@ def uniform_noise(keys: Integers, index: Integers, dtype: DTypeLike = np.float64
 
 def normal_noise(keys: Integers, index: Integers, size: int) -> Array:
     """`size` standard normal numbers for each key at each index, (size, ...) with their broadcast shape."""
-    return np.stack([ndtri(_uniform(keys, index * np.uint64(size) + np.uint64(i))) for i in range(size)])
-
-
-def _uniform(keys: Integers, index: Integers) -> Array:
-    """Uniform numbers between 0 and 1, never either."""
-    return ((_random_bits(keys, index) >> _SHIFTS[3]) + 0.5) * 2.0**-53
+    numbers = np.arange(size, dtype=np.uint64).reshape(-1, *[1] * index.ndim)
+    bits = _random_bits(keys, index * np.uint64(size) + numbers)
+    return ndtri(((bits >> _SHIFTS[3]) + 0.5) * 2.0**-53)
 
 
 def _random_bits(keys: Integers, index: Integers) -> Integers:

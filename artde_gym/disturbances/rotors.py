@@ -4,49 +4,68 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
+import numpy as np
+
+from artde_gym.arrays import Array
 from artde_gym.robots import q450 as robot
 from artde_gym.robots.lag import follow, lag_shares
 
-Thrusts = tuple[float, float, float, float]
-
 
 class Rotors:
-    """The four rotors of one vehicle during one episode, on plain numbers.
+    """The four rotors of one vehicle during one episode.
 
     Args:
         realised: drawn disturbances, of which "torque_delay", "actuator_loss" and "motor_lag" matter here.
         thrusts: with which they turn at the start (N), as they did for ever before.
         time_step: of the physics (s).
+        steps: of the physics in a control period.
+
+    Attributes:
+        thrusts: now (4,) (N).
     """
 
-    def __init__(self, realised: Mapping[str, Any], thrusts: Sequence[float], time_step: float) -> None:
-        self.thrusts = list(thrusts)
-        self._closed, self._closed_mean = lag_shares(
-            realised.get("motor_lag", {}).get("time_constant", robot.ROTOR_LAG), time_step
+    def __init__(self, realised: Mapping[str, Any], thrusts: Sequence[float], time_step: float, steps: int) -> None:
+        self.thrusts = np.array(thrusts)
+        constant = realised.get("motor_lag", {}).get("time_constant", robot.ROTOR_LAG)
+        self._mean = lag_shares(constant, time_step)[1]
+        self._ends = np.array(
+            [[lag_shares(constant, step * time_step)[0] if step else 0.0] for step in range(steps + 1)]
         )
+        self._steps = steps
         self._losses = [
-            (robot.ROTORS.index(loss["joint"]), loss["factor"], round(loss["start"] / time_step))
+            (round(loss["start"] / time_step), robot.ROTORS.index(loss["joint"]), loss["factor"])
             for loss in realised.get("actuator_loss", ())
         ]
         self._late = deque([self.thrusts] * realised.get("torque_delay", {}).get("samples", 0))
-        self._aim = self._target = self.thrusts
 
-    def command(self, wrench: Sequence[float]) -> None:
-        """Begin a control period with the wrench [u1 (N), u2, u3, u4 (Nm)]."""
-        self._late.append([min(max(thrust, 0.0), robot.MAX_THRUST) for thrust in robot.thrusts(*wrench)])
-        self._target = self._late.popleft()
+    def advance(self, wrench: Sequence[float], first: int) -> Array:
+        """Mean thrusts (steps, 4) (N) over each physics step of a control period.
 
-    def advance(self, step: int) -> list[float]:
-        """Mean thrusts (N) over physics step `step`, counted from the start of the episode."""
-        target = self._target
-        if self._losses:
-            target = list(target)
-            for rotor, factor, first in self._losses:
-                if step >= first:
-                    target[rotor] *= factor
-        closed, closed_mean = self._closed, self._closed_mean
-        both = [follow(thrust, aim, closed, closed_mean) for thrust, aim in zip(self.thrusts, target, strict=True)]
-        self.thrusts = [end for end, _ in both]
-        return [mean for _, mean in both]
+        Args:
+            wrench: the command [u1 (N), u2, u3, u4 (Nm)] with which the period begins.
+            first: its first physics step, counted from the start of the episode.
+        """
+        aim = np.array([min(max(thrust, 0.0), robot.MAX_THRUST) for thrust in robot.thrusts(*wrench)])
+        self._late.append(aim)
+        aim = self._late.popleft()
+        if not self._losses:
+            return self._follow(aim, self._steps)
+        end = first + self._steps
+        marks = sorted({first, end, *(start for start, _, _ in self._losses if first < start < end)})
+        return np.concatenate([self._follow(self._left(aim, a), b - a) for a, b in pairwise(marks)])
+
+    def _follow(self, target: Array, steps: int) -> Array:
+        values, _ = follow(self.thrusts, target, self._ends[: steps + 1], 0.0)
+        self.thrusts = values[-1]
+        return follow(values[:-1], target, 0.0, self._mean)[1]
+
+    def _left(self, aim: Array, step: int) -> Array:
+        """What losses leave of an aim."""
+        aim = aim.copy()
+        for start, rotor, factor in self._losses:
+            if step >= start:
+                aim[rotor] *= factor
+        return aim

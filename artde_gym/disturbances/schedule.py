@@ -48,6 +48,11 @@ class Schedule:
         if self._payload.get("attach") == 0 and self._payload["drop"] > 0:
             self._attach(engine)
 
+    def quiet(self, first: int, end: int) -> bool:
+        """Whether nothing acts, begins or ends from step `first` up to, not including, `end`."""
+        acting = any(push.first < end and first <= push.end for push in self._pushes)
+        return not acting and not any(first <= step < end for step in self._changes)
+
     def apply(self, step: int, engine: Engine) -> list[str]:
         """Bring about what belongs to a step; returns what begins or ends with it, in words."""
         events = self._changes.get(step, [])

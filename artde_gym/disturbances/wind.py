@@ -52,7 +52,7 @@ class Air(NamedTuple, Generic[Number]):
     gust_kick: Number
 
 
-CALM = Air(*[0.0] * 17)
+CALM: Air[float] = Air._make([0.0] * 17)
 """Air that does not move."""
 
 
@@ -60,10 +60,10 @@ def air(wind: Mapping[str, Any] | None) -> Air[float]:
     """The air of a realised disturbance `wind`, or calm air."""
     if wind is None:
         return CALM
-    scale, direction = wind["scale"], np.asarray(wind["fan_direction"])
-    axis = (direction / np.linalg.norm(direction)).tolist()
+    scale, direction = wind["scale"], wind["fan_direction"]
+    axis = [component / math.hypot(*direction) for component in direction]
     ambient_keep, gust_keep = (math.exp(-GRID / wind[name]) for name in ("ambient_time", "turbulence_time"))
-    return Air(
+    numbers = (
         *(scale * component for component in wind["steady"]),
         ambient_keep,
         scale * wind["ambient"] * math.sqrt(1.0 - ambient_keep**2),
@@ -74,6 +74,7 @@ def air(wind: Mapping[str, Any] | None) -> Air[float]:
         gust_keep,
         wind["turbulence"] * math.sqrt(1.0 - gust_keep**2),
     )
+    return Air._make(numbers)
 
 
 def advance(keep: Number, kick: Number, state: Number, noise: Number) -> Number:
@@ -106,9 +107,9 @@ def velocity(
 class Wind:
     """The wind around one vehicle during one episode, on the grid."""
 
-    def __init__(self, wind: Mapping[str, Any], key: int) -> None:
+    def __init__(self, wind: Mapping[str, Any], key: np.uint64) -> None:
         self._air = air(wind)
-        self._key = np.array([key], dtype=np.uint64)
+        self._key = np.array([key])
         self._noise: list[list[float]] = []
         self._read = 0  # grid points
         self._ambient = (0.0, 0.0, 0.0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import inspect
 import math
 import operator
 from collections.abc import Callable, Mapping
@@ -19,6 +18,7 @@ from artde_gym.disturbances.actuation import Actuation
 from artde_gym.disturbances.ground import LOADED, GrfPulse
 from artde_gym.disturbances.schedule import Schedule
 from artde_gym.disturbances.sensing import Sensing
+from artde_gym.envs.documentation import filled
 from artde_gym.envs.options import disturbances_in, steps_per_period
 from artde_gym.errors import ActionError, OptionError
 from artde_gym.layout import Field, Layout
@@ -86,6 +86,7 @@ TRACKING = Tracking(
     near=0.0,
     tde_errors={"tde_error_rms": "sigma"},
     means={"robust_gain_mean": "c"},
+    told=("foot_loads",),
     speed=lambda fields: fields["base_velocity"][..., 0],
 )
 
@@ -399,11 +400,4 @@ def _roll_pitch(state: State) -> tuple[float, float]:
 
 def document(default: str) -> Callable[[type[BipedEnv]], type[BipedEnv]]:
     """Class decorator: fill the sections that all tasks share into a docstring, at `{shared}`."""
-
-    def filled(task: type[BipedEnv]) -> type[BipedEnv]:
-        own = inspect.cleandoc(str(task.__doc__))
-        shared = TASK_DOCUMENTATION.format(observation=OBSERVATION.table(), default=default)
-        task.__doc__ = own.format(shared=shared)
-        return task
-
-    return filled
+    return filled(shared=TASK_DOCUMENTATION.format(observation=OBSERVATION.table(), default=default))

@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
 from artde_gym.disturbances.ground_effect import thrust_gain
-from artde_gym.disturbances.noise import draw_key
+from artde_gym.disturbances.noise import draw_keys
 from artde_gym.disturbances.rotors import Rotors
 from artde_gym.disturbances.schedule import Schedule
 from artde_gym.disturbances.wind import GRID, Wind
 from artde_gym.envs import quadrotor_task as task
+from artde_gym.envs.documentation import filled
 from artde_gym.envs.options import disturbances_in, steps_per_period
+from artde_gym.envs.quadrotor_sensors import Measurement, Sensors
 from artde_gym.errors import ActionError, OptionError
 from artde_gym.references.infinity import START
 from artde_gym.robots import q450 as robot
@@ -31,10 +33,35 @@ STEPS = 5  # physics steps from one grid point to the next
 
 _NOTHING = (0.0, 0.0, 0.0)
 _NO_JOINTS = np.zeros(0)
+_WRENCH, _THRUST = task.OBSERVATION["wrench_applied"], task.OBSERVATION["rotor_thrust"]
 
 
+@filled(shared=task.DOCUMENTATION)
 class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
-    """doc."""
+    """A quadrotor flies an infinity-shaped path with a payload, drops it half-way, and flies the path once more.
+
+    ## Description
+    After section 3.5 of Dantu, *Adaptive Artificial Time Delay Control for Robotic Systems* (2023): a Q-450 frame, a
+    payload of 0.35 kg until 35 s, a fan, a low path. The vehicle moves in a physics engine; `gym.make_vec` with
+    `vectorization_mode="vector_entry_point"` gives thousands of the same in NumPy (`artde_gym.envs.quadrotor_batch`).
+
+    {shared}
+    | `engine` | "bullet" | "bullet" | physics engine |
+
+    `reset(options={{"disturbances": ..., "scenario": "Q1"}})` replaces the disturbances of this and the following
+    episodes, by a mapping or by those of a named scenario.
+
+    ## Info
+    `time_s`, `reward_terms`; at reset `disturbances` (realised values, as the grammar writes them); `events` when a
+    push or the payload begins or ends; after a crash `fall_reason`.
+
+    ## Versions
+    * v0: first version.
+
+    Raises:
+        OptionError: for an argument out of range.
+        DisturbanceError: for a malformed disturbance.
+    """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}
 
@@ -48,7 +75,7 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         *,
         disturbances: Mapping[str, Any] | None = None,
         control_period: float = 0.015,
-        measurement: Literal["ideal", "mocap"] = "ideal",
+        measurement: Measurement = "ideal",
         duration: float = 70.0,
         engine: EngineName = "bullet",
         render_mode: Literal["rgb_array"] | None = None,
@@ -60,6 +87,8 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         self._ticks = steps_per_period(control_period, GRID)
         self.control_period = self._ticks * GRID
         self.measurement = measurement
+        self.duration = duration
+        self._sensors = Sensors(1, measurement, self.control_period, np.float64)
         self.nominal_robot = robot.q450()
         self._plan = task.plan(duration, self.control_period)
         self._last = len(self._plan) - 1
@@ -82,7 +111,7 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         if disturbances is not None:
             self._disturbances = task.parse(disturbances)
         realised = self._disturbances.draw(self.np_random)
-        self._begin(realised, draw_key(self.np_random))
+        self._begin(realised, draw_keys(self.np_random, task.STREAMS))
         return self._measure(), {"time_s": 0.0, "disturbances": realised}
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
@@ -125,7 +154,7 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
     def close(self) -> None:
         self._engine.close()
 
-    def _begin(self, realised: Mapping[str, Any], key: int) -> None:
+    def _begin(self, realised: Mapping[str, Any], keys: NDArray[np.uint64]) -> None:
         """Set an episode up: the vehicle at rest in balance."""
         engine = self._engine
         engine.restore(self._placed)
@@ -134,72 +163,83 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         engine.scale_masses(realised.get("mass_error", {}).get("factor", 1.0))
         self._schedule = Schedule(realised, TIME_STEP)
         self._schedule.start(engine)
-        self._rotors = Rotors(realised, task.hover_thrusts(realised), TIME_STEP)
-        self._wrench = robot.wrench(*self._rotors.thrusts)
-        self._wind = Wind(realised["wind"], key) if "wind" in realised else None
+        self._rotors = Rotors(realised, task.hover_thrusts(realised), TIME_STEP, self._ticks * STEPS)
+        self._wrench = robot.MIXER @ self._rotors.thrusts
+        self._wind = Wind(realised["wind"], keys[0]) if "wind" in realised else None
         self._ground_effect = realised.get("ground_effect", {}).get("strength", 0.0)
+        self._sensors.begin(0, realised, keys[1:])
         self._k = 0
         self._over = False
+        self._read()
 
     def _simulate(self, command: list[float]) -> list[str]:
         """Let `command` act for one control period, with what disturbs it; returns what began or ended meanwhile."""
-        engine, rotors, events = self._engine, self._rotors, []
-        rotors.command(command)
+        engine, events = self._engine, []
         steps = self._ticks * STEPS
         first = self._k * steps
-        total = [0.0] * len(robot.ROTORS)
-        for step in range(first, first + steps):
-            events += self._schedule.apply(step, engine)
-            if step % STEPS == 0:
-                (wx, wy, wz), gains = self._air()
-            thrusts = rotors.advance(step)
-            total = list(map(operator.add, total, thrusts))
-            if gains is not None:
-                thrusts = map(operator.mul, thrusts, gains)
-            u1, u2, u3, u4 = robot.wrench(*thrusts)
-            (vx, vy, vz), _ = engine.base_twist()
-            engine.push_base((0.0, 0.0, u1), (u2, u3, u4), body_axes=True)
-            engine.push_base(
-                (robot.DRAG * (wx - vx), robot.DRAG * (wy - vy), robot.DRAG * (wz - vz)), _NOTHING, body_axes=False
-            )
-            engine.step(_NO_JOINTS)
-        self._wrench = robot.wrench(*(thrust / steps for thrust in total))
+        thrusts = self._rotors.advance(command, first)
+        wrenches = thrusts @ robot.MIXER.T
+        rows = wrenches.tolist()
+        quiet = self._schedule.quiet(first, first + steps)
+        for start in range(0, steps, STEPS):
+            end = start + STEPS
+            if self._ground_effect:
+                rows[start:end] = ((thrusts[start:end] * self._gains()) @ robot.MIXER.T).tolist()
+            drag_x, drag_y, drag_z = self._drag()
+            for step in range(start, end):
+                if not quiet:
+                    events += self._schedule.apply(first + step, engine)
+                u1, u2, u3, u4 = rows[step]
+                engine.push_base((drag_x, drag_y, drag_z + u1), (u2, u3, u4), body_axes=True)
+                engine.step(_NO_JOINTS)
+            self._read()
+        self._wrench = np.add.reduce(wrenches) / steps
         return events
 
-    def _air(self) -> tuple[Vector, list[float] | None]:
-        """Velocity of the air and gain of each rotor's thrust until the next grid point."""
-        if self._wind is None and not self._ground_effect:
-            return _NOTHING, None
-        state = self._engine.read()
-        velocity = _NOTHING if self._wind is None else self._wind.next(state.position)
-        if not self._ground_effect:
-            return velocity, None
-        ahead, aside, _ = _rotation(state.quat_xyzw)[6:]
-        heights = robot.rotor_heights(state.position[2], ahead, aside)
-        return velocity, [thrust_gain(height, robot.ROTOR_RADIUS, self._ground_effect, max) for height in heights]
+    def _read(self) -> None:
+        self._state = self._engine.read()
+        self._rot = _rotation(self._state.quat_xyzw)
+
+    def _drag(self) -> Vector:
+        """Force of the air until the next grid point (N), body axes."""
+        state, (xx, xy, xz, yx, yy, yz, zx, zy, zz) = self._state, self._rot
+        wx, wy, wz = _NOTHING if self._wind is None else self._wind.next(state.position)
+        vx, vy, vz = state.velocity
+        x, y, z = robot.DRAG * (wx - vx), robot.DRAG * (wy - vy), robot.DRAG * (wz - vz)
+        return xx * x + yx * y + zx * z, xy * x + yy * y + zy * z, xz * x + yz * y + zz * z
+
+    def _gains(self) -> Array:
+        """Gain of each rotor's thrust (4,) until the next grid point."""
+        heights = np.array(robot.rotor_heights(self._state.position[2], self._rot[6], self._rot[7]))
+        return thrust_gain(heights, robot.ROTOR_RADIUS, self._ground_effect, np.maximum)
 
     def _measure(self) -> Array:
-        """Read the engine; returns the observation."""
-        state = self._state = self._engine.read()
-        rot = self._rot = _rotation(state.quat_xyzw)
+        """The observation of the state that was read last."""
+        state, rot = self._state, self._rot
         wx, wy, wz = state.angular_velocity
-        rates = self._rates = tuple(rot[i] * wx + rot[3 + i] * wy + rot[6 + i] * wz for i in range(3))
+        rates = (rot[i] * wx + rot[3 + i] * wy + rot[6 + i] * wz for i in range(3))
         observation = np.empty(task.OBSERVATION.size)
         observation[task.MEASURED] = (*state.position, *state.velocity, *rot, *rates)
         plan = self._plan[self._k]
         observation[task.REFERENCE] = plan[:-1]
-        observation[task.APPLIED] = (*self._wrench, *self._rotors.thrusts)
+        observation[_WRENCH] = self._wrench
+        observation[_THRUST] = self._rotors.thrusts
         observation[task.PHASE] = plan[-1]
+        self._sensors.measure(observation[:, None], np.array([self._k]))
         return observation
 
-    def _reward_terms(self, before: list[float]) -> dict[str, float]:
+    def _reward_terms(self, before: Array) -> dict[str, float]:
         plan = self._plan[self._k, :6].tolist()
-        error = tuple(map(operator.sub, plan[:3], self._state.position))
-        velocity_error = tuple(map(operator.sub, plan[3:], self._state.velocity))
-        return task.reward_terms(error, velocity_error, self._rot[8], self._rotors.thrusts, before, math.exp)
+        error = math.dist(plan[:3], self._state.position) ** 2
+        velocity_error = math.dist(plan[3:], self._state.velocity) ** 2
+        thrusts = self._rotors.thrusts
+        change = thrusts - before
+        effort, smoothness = float(thrusts.dot(thrusts)), float(change.dot(change))
+        return task.reward_terms(error, velocity_error, self._rot[8], effort, smoothness, math.exp)
 
     def _falls(self) -> tuple[bool, bool, bool]:
-        return task.falls(self._state.position, self._rot[8], self._rates)
+        spin = math.hypot(*self._state.angular_velocity) ** 2
+        return task.falls(self._state.position, self._rot[8], spin)
 
 
 def _rotation(quat_xyzw: tuple[float, float, float, float]) -> tuple[float, ...]:

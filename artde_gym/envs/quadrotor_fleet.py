@@ -70,36 +70,43 @@ class Fleet:
         self._air = np.zeros((len(Air._fields), n), dtype)
         self._here = Air(*self._air)  # the same numbers
         self._keys = np.zeros(n, np.uint64)
-        self._ambient, self._gust = np.zeros((3, n), dtype), np.zeros(n, dtype)
+        self._winds = np.zeros((4, n), dtype)  # states of the wind's processes: ambient, gust
+        self._keep, self._kick = np.zeros((4, n), dtype), np.zeros((4, n), dtype)
         self._windy = False
         self._ground_effect = np.zeros(n, dtype)
         self._pushes = np.zeros((0, 3, n), dtype)  # forces that act (N, world axes)
         self._places = np.zeros((0, 3, n), dtype)  # where (m, body axes)
 
-    def begin(self, vehicle: int, realised: Mapping[str, Any], key: int) -> None:
-        """Begin an episode of one vehicle, at rest in balance, with realised disturbances and the key of its noise."""
+    def begin(self, vehicle: int, realised: Mapping[str, Any], key: np.uint64) -> None:
+        """Begin an episode of one vehicle, at rest in balance, with realised disturbances and the key of its wind."""
         self._begun[vehicle] = self._step
         self._begin_rotors(vehicle, realised)
         self._air[:, vehicle] = air(realised.get("wind"))
         self._keys[vehicle] = key
-        self._ambient[:, vehicle] = self._gust[vehicle] = 0.0
+        self._winds[:, vehicle] = 0.0
+        here = self._here
+        for rows, ambient, gust in (
+            (self._keep, here.ambient_keep, here.gust_keep),
+            (self._kick, here.ambient_kick, here.gust_kick),
+        ):
+            rows[:3, vehicle], rows[3, vehicle] = ambient[vehicle], gust[vehicle]
         self._windy |= "wind" in realised
         self._ground_effect[vehicle] = realised.get("ground_effect", {}).get("strength", 0.0)
 
         factor = realised.get("mass_error", {}).get("factor", 1.0)
         bare = MassProperties(factor * robot.MASS, (0.0, 0.0, 0.0), factor * np.diag(robot.INERTIA))
-        payload = realised.get("payload")
-        carried = payload is not None and payload["attach"] == 0.0 < payload["drop"]
-        self.bodies.set_properties(vehicle, composite(bare, _ball(payload)) if carried else bare)
-        self.bodies.place(vehicle, task.start(realised))
-
         events = [*self._push_events(vehicle, realised), *self._loss_events(vehicle, realised)]
+        change = partial(self.bodies.set_properties, vehicle)
+        change(bare)
+        payload = realised.get("payload")
         if payload is not None and payload["drop"] > payload["attach"]:
-            change = partial(self.bodies.set_properties, vehicle)
-            if not carried:
-                loaded = partial(change, composite(bare, _ball(payload)))
-                events.append(_Event(round(payload["attach"] / GRID), "payload attached", loaded))
+            loaded = composite(bare, _ball(payload))
+            if payload["attach"] == 0:
+                change(loaded)
+            else:
+                events.append(_Event(round(payload["attach"] / GRID), "payload attached", partial(change, loaded)))
             events.append(_Event(round(payload["drop"] / GRID), "payload dropped", partial(change, bare)))
+        self.bodies.place(vehicle, task.start(realised))
         events.sort(key=lambda event: event.step)
         self._agenda[vehicle] = events[::-1]
         self._await(vehicle)
@@ -109,9 +116,7 @@ class Fleet:
         events: dict[int, list[str]] = {}
         bodies, aims = self.bodies, self._aims(commands)
         goals = aims * self._left
-        if self._windy:
-            index = (self._step - self._begun).astype(np.uint64) + np.arange(self._steps, dtype=np.uint64)[:, None]
-            noise = uniform_noise(self._keys, index, self.thrusts.dtype)
+        noise = self._noise() if self._windy else None
         total = np.zeros_like(self.thrusts)
         for step in range(self._steps):
             bodies.drift(GRID if step else 0.5 * GRID)
@@ -121,7 +126,7 @@ class Fleet:
             self.thrusts, mean = follow(self.thrusts, goals, *self._shares)
             total += mean
             origin = bodies.origin()
-            wind = self._wind(origin, noise[:, step]) if self._windy else 0.0
+            wind = 0.0 if noise is None else self._wind(origin, noise[:, step])
             u1, *torques = robot.wrench(*(mean * self._gains(origin[2])))
             force = bodies.rot[:, 2] * u1
             force += robot.DRAG * (wind - bodies.origin_velocity())
@@ -154,12 +159,16 @@ class Fleet:
         self._late[period % SLOTS] = aims
         return self._late[(period - self._delay) % SLOTS, :, np.arange(aims.shape[1])].T
 
+    def _noise(self) -> Array:
+        """Noise of the wind for the steps of this control period (4, steps, n)."""
+        index = (self._step - self._begun).astype(np.uint64) + np.arange(self._steps, dtype=np.uint64)[:, None]
+        return uniform_noise(self._keys, index, self.thrusts.dtype)
+
     def _wind(self, origin: Array, noise: Array) -> Array:
         """Velocity of the air at each vehicle's place during this step (3, n) (m/s), world axes."""
-        here, (x, y, z), (ax, ay, az) = self._here, origin, self._ambient
-        wind = np.stack(velocity(here, (ax, ay, az), self._gust, (x, y, z), np.exp))
-        self._ambient = advance(here.ambient_keep, here.ambient_kick, self._ambient, noise[:3])
-        self._gust = advance(here.gust_keep, here.gust_kick, self._gust, noise[3])
+        (x, y, z), (ax, ay, az, gust) = origin, self._winds
+        wind = np.stack(velocity(self._here, (ax, ay, az), gust, (x, y, z), np.exp))
+        self._winds = advance(self._keep, self._kick, self._winds, noise)
         return wind
 
     def _gains(self, height: Array) -> Array | float:

@@ -12,6 +12,7 @@ import numpy as np
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.ground_effect import thrust_gain
+from artde_gym.disturbances.wind import GRID
 from artde_gym.layout import Field, Layout
 from artde_gym.references.infinity import START, infinity_path
 from artde_gym.robots import q450 as robot
@@ -19,6 +20,7 @@ from artde_gym.robots.dynamics import GRAVITY
 from artde_gym.robots.spec import Vector
 from artde_gym.tracking import Effort, Fields, Tracked, Tracking
 
+STREAMS = 3  # of noise in an episode: wind, motion capture, sensor noise
 DEFAULT_DISTURBANCES: dict[str, Any] = {"payload": {"mass": 0.35, "drop": 35.0}, "wind": 1.0, "ground_effect": 1.0}
 
 VOLUME = 3.0  # m, of flight: to either side of the start, and above the ground
@@ -53,7 +55,6 @@ OBSERVATION = Layout(
 )
 MEASURED = slice(0, OBSERVATION["body_rates"].stop)  # what sensors give
 REFERENCE = slice(MEASURED.stop, OBSERVATION["yaw_rate_ref"].stop)
-APPLIED = slice(REFERENCE.stop, OBSERVATION["rotor_thrust"].stop)
 PHASE = OBSERVATION["phase"].start
 ACTION = Layout(
     (
@@ -104,6 +105,63 @@ TRACKING = Tracking(
 )
 """Position and attitude, as in table 3.1 of the thesis; an error of 2 cm counts as recovered."""
 
+DOCUMENTATION = f"""\
+## Action
+`wrench`, four numbers: thrust u1 (N) along the body's z axis, and torques u2, u3, u4 (Nm) about its x, y and z axes:
+
+{ACTION.table()}
+
+They are allocated to the four rotors, each of which is limited to 0 to {robot.MAX_THRUST:g} N and follows its command
+as a first-order lag of {robot.ROTOR_LAG:g} s. Held for one control period. The bounds are what the rotors give of one
+of them at a time; beyond, they give what they can. Use Gymnasium's `RescaleAction` for [-1, 1].
+
+## Observation
+{OBSERVATION.table()}
+
+`wrench_applied` is what really acted, after limits, lag and losses of rotors, but without the gain of thrust near the
+ground: the time-delay estimate needs just that. What policies do not see: payload, wind, pushes, ground effect.
+
+## Reference
+The infinity-shaped path of `artde_gym.references.infinity`: loop 1 until 33 s, rest until 37 s, loop 2 until 70 s;
+yaw 0.
+
+## Reward
+Over a control period L, L times the sum of scale x term; each term is in `info["reward_terms"]`:
+
+| term | scale | value |
+|---|---|---|
+| `alive` | 1 | 1 |
+| `position` | 2 | exp(-\\|e\\|^2 / 0.01), e = position_ref - position in m |
+| `velocity` | 0.5 | exp(-\\|e\\|^2 / 0.05), e = velocity_ref - velocity in m/s |
+| `upright` | 0.5 | cosine of the tilt |
+| `effort` | -0.05 | mean of (rotor thrust / 8.5 N)^2 |
+| `smoothness` | -0.05 | mean of (change of rotor thrust / 8.5 N)^2 |
+
+A flight of 70 s without an error earns a little under 280.
+
+## Start
+At rest and level at the path's start, in balance with the payload and on thrusts that have settled.
+
+## End
+*Terminated* by a crash, with the reason in `info["fall_reason"]`: "ground" (the vehicle's origin lower than
+{GROUND_HEIGHT:g} m), "inverted" (tilt above 90 degrees) or "bounds" (x or y beyond {VOLUME:g} m, z above {VOLUME:g} m,
+or turning faster than {TUMBLING:g} rad/s). *Truncated* after `duration`.
+
+## Physics
+Vehicle of {robot.MASS:g} kg with linear drag of {robot.DRAG:g} N s/m against the air; see `artde_gym.robots.q450`. Wind
+and ground effect are those of `artde_gym.disturbances`; the air's force is found every {GRID:g} s and acts unchanged
+along the body's axes until the next time.
+
+## Arguments
+| name | default | allowed | meaning |
+|---|---|---|---|
+| `disturbances` | payload of 0.35 kg until 35 s, wind, ground effect | see `artde_gym.disturbances` | what happens \
+besides; `{{}}` for nothing |
+| `control_period` | 0.015 | whole multiples of {GRID:g} s up to 0.05 | time between two actions, L |
+| `measurement` | "ideal" | "ideal", "mocap" | the state itself, or what `artde_gym.disturbances.mocap` sees of it |
+| `duration` | 70.0 | from 0.1 s | length of the flight |"""
+"""What the pages of both environments share; their own arguments follow."""
+
 REWARD_SCALES: dict[str, float] = {
     "alive": 1.0,
     "position": 2.0,
@@ -121,42 +179,34 @@ Vector4 = tuple[Number, Number, Number, Number]
 
 
 def reward_terms(
-    error: Vector3[Number],
-    velocity_error: Vector3[Number],
-    up: Number,
-    thrust: Vector4[Number],
-    thrust_before: Vector4[Number],
-    exp: Callable[[Number], Number],
+    error: Number, velocity_error: Number, up: Number, thrust: Number, change: Number, exp: Callable[[Number], Number]
 ) -> dict[str, Number]:
     """The reward's terms in the order of `REWARD_SCALES`, elementwise.
 
     Args:
-        error, velocity_error: of tracking (m, m/s).
+        error, velocity_error: squared norms of the tracking errors (m^2, m^2/s^2).
         up: world z component of the body's z axis.
-        thrust, thrust_before: of the rotors now and one control period ago (N).
+        thrust, change: squared norms of the rotors' thrusts now and of what they changed in a control period (N^2).
         exp: the exponential function for this kind of number.
     """
-    x, y, z = error
-    vx, vy, vz = velocity_error
-    a, b, c, d = thrust
-    da, db, dc, dd = a - thrust_before[0], b - thrust_before[1], c - thrust_before[2], d - thrust_before[3]
     return {
-        "alive": 0.0 * x + 1.0,
-        "position": exp(-100.0 * (x * x + y * y + z * z)),
-        "velocity": exp(-20.0 * (vx * vx + vy * vy + vz * vz)),
+        "alive": 0.0 * error + 1.0,
+        "position": exp(-100.0 * error),
+        "velocity": exp(-20.0 * velocity_error),
         "upright": up,
-        "effort": _THRUST_SCALE * (a * a + b * b + c * c + d * d),
-        "smoothness": _THRUST_SCALE * (da * da + db * db + dc * dc + dd * dd),
+        "effort": _THRUST_SCALE * thrust,
+        "smoothness": _THRUST_SCALE * change,
     }
 
 
-def falls(position: Vector3[Number], up: Number, rates: Vector3[Number]) -> tuple[Any, Any, Any]:
-    """Whether each of `FALL_REASONS` holds, elementwise; a state that is no number any more is out of bounds."""
+def falls(position: Vector3[Number], up: Number, spin: Number) -> tuple[Any, Any, Any]:
+    """Whether each of `FALL_REASONS` holds, elementwise; a state that is no number any more is out of bounds.
+
+    `up` is as in `reward_terms`, `spin` the squared norm of the body rates (rad^2/s^2).
+    """
     x, y, z = position
-    p, q, r = rates
-    volume = (abs(x) <= VOLUME) & (abs(y) <= VOLUME) & (z <= VOLUME)
-    spin = p * p + q * q + r * r <= TUMBLING**2
-    return z < GROUND_HEIGHT, up < 0.0, (volume & spin) ^ True
+    inside = (abs(x) <= VOLUME) & (abs(y) <= VOLUME) & (z <= VOLUME) & (spin <= TUMBLING**2)
+    return z < GROUND_HEIGHT, up < 0.0, inside ^ True
 
 
 def parse(disturbances: Mapping[str, Any]) -> Disturbances:

@@ -59,7 +59,7 @@ def run_episode(
 
     observation, info = env.reset(seed=seed, options=options)
     disturbances = info["disturbances"]
-    observations, diagnostics = [observation], []
+    observations, diagnostics, told = [observation], [], [_told(plant, info)]
     state, episode_start = None, True
     terminated = truncated = False
     total = 0.0
@@ -72,6 +72,8 @@ def run_episode(
         observation, reward, terminated, truncated, info = env.step(action)
         total += float(reward)
         observations.append(observation)
+        if count % stride == 0:
+            told.append(_told(plant, info))
         if on_progress is not None and count % report_every == 0:
             on_progress(info["time_s"])
 
@@ -84,7 +86,8 @@ def run_episode(
     reason = info.get("fall_reason", "") if terminated else None
     row = row_of(reason, info["time_s"], total, metrics.rows()[0], disturbances)
     kept = slice(None, None, stride // diagnosed_every)
-    return Episode(row, traces_of(stride * period, _part(fields, slice(None, None, stride)), _part(inside, kept)))
+    seen = _part(fields, slice(None, None, stride)) | stack(told)
+    return Episode(row, traces_of(stride * period, seen, _part(inside, kept)))
 
 
 def metrics_for(plant: Any, disturbances: Sequence[Mapping[str, Any]], phases: Sequence[Span]) -> Metrics:
@@ -111,7 +114,7 @@ def row_of(
 
 
 def traces_of(period: float, fields: dict[str, Array], inside: dict[str, Array]) -> dict[str, Array]:
-    """Signals of one episode, sampled every `period` (s): observations and the policy's diagnostics."""
+    """Signals of one episode, sampled every `period` (s): observations (and more) and the policy's diagnostics."""
     return {
         "time": period * np.arange(len(next(iter(fields.values())))),
         **{name: values.astype(np.float32) for name, values in fields.items()},
@@ -122,6 +125,10 @@ def traces_of(period: float, fields: dict[str, Array], inside: dict[str, Array])
 def stack(samples: list[dict[str, Array]]) -> dict[str, Array]:
     """Samples of named arrays as named arrays of samples."""
     return {name: np.array([sample[name] for sample in samples]) for name in samples[0]} if samples else {}
+
+
+def _told(plant: Any, info: dict[str, Any]) -> dict[str, Array]:
+    return {name: np.array(info[name]) for name in plant.tracking.told}
 
 
 def _part(signals: dict[str, Array], part: Any) -> dict[str, Array]:

@@ -52,6 +52,8 @@ PAYLOAD_FORCE = 1e5  # N, likewise
 HOLD_TORQUE = 100.0  # Nm, of the motors that hold joints which nobody actuates
 
 _ORIGIN = (0.0, 0.0, 0.0)
+_NO_JOINTS = np.zeros(0)
+_NO_JOINTS.flags.writeable = False
 
 
 class BulletEngine:
@@ -166,21 +168,16 @@ class BulletEngine:
 
     def read(self) -> State:
         client = self._client
-        states = bullet.getJointStates(self._robot, self._joints, physicsClientId=client) if self._joints else ()
-        n = len(states)
-        joints = np.array([state[0] for state in states] + [state[1] for state in states])  # one array is faster
         center, quat = bullet.getBasePositionAndOrientation(self._robot, physicsClientId=client)
         velocity, spin = bullet.getBaseVelocity(self._robot, physicsClientId=client)
+        if not self._joints and not any(self._com):
+            return State(_NO_JOINTS, _NO_JOINTS, center, quat, velocity, spin)
+        states = bullet.getJointStates(self._robot, self._joints, physicsClientId=client)
+        n = len(states)
+        joints = np.array([state[0] for state in states] + [state[1] for state in states])  # one array is faster
         x, y, z = arm = rotated(self._to_origin, quat)
         position = (center[0] + x, center[1] + y, center[2] + z)
         return State(joints[:n], joints[n:], position, quat, moved(velocity, spin, arm), spin)
-
-    def base_twist(self) -> tuple[Vector, Vector]:
-        velocity, spin = bullet.getBaseVelocity(self._robot, physicsClientId=self._client)
-        if not any(self._com):
-            return velocity, spin
-        _, quat = bullet.getBasePositionAndOrientation(self._robot, physicsClientId=self._client)
-        return moved(velocity, spin, rotated(self._to_origin, quat)), spin
 
     def step(self, tau: Array) -> None:
         if self._joints:

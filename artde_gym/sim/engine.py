@@ -78,10 +78,6 @@ class Engine(Protocol):
         """The state now: after the last step, or as placed or restored. Later steps do not change what was read."""
         ...
 
-    def base_twist(self) -> tuple[Vector, Vector]:
-        """Velocity of the base link's origin (m/s) and angular velocity (rad/s), world axes: a cheap part of `read`."""
-        ...
-
     def step(self, tau: Array) -> None:
         """Advance one `time_step` under joint torques `tau` (n,) (Nm)."""
         ...

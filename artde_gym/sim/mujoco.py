@@ -96,10 +96,6 @@ class MujocoEngine:
         q, qd = self._q[self._joints].copy(), self._qd[self._joints].copy()
         return State(q, qd, (x, y, z), quat, (vx, vy, vz), rotated((wx, wy, wz), quat))
 
-    def base_twist(self) -> tuple[Vector, Vector]:
-        vx, vy, vz, wx, wy, wz = self._twist.tolist()
-        return (vx, vy, vz), rotated((wx, wy, wz), self._quat())
-
     def step(self, tau: Array) -> None:
         self._torque[self._joints] = tau
         mj.mj_step(self._model, self._data)

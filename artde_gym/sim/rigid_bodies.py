@@ -159,3 +159,15 @@ def transposed_times(matrices: Array, vectors: Array) -> Array:
 def cross(a: Array, b: Array) -> Array:
     """Cross products of vectors (3, ...), body by body."""
     return a.take(_NEXT, 0) * b.take(_LAST, 0) - a.take(_LAST, 0) * b.take(_NEXT, 0)
+
+
+def turned(rot: Array, vectors: Array) -> Array:
+    """Attitudes (3, 3, n) turned about `vectors` (3, n) in body axes by angles of 2 atan(|v| / 2), about |v|."""
+    half = 0.5 * vectors
+    square = half * half
+    factor = 2.0 / (1.0 + (square[0] + square[1] + square[2]))
+    out = np.empty_like(rot)
+    for row, own in enumerate(rot):  # r (1 + f ([h]x + [h]x^2)) = r + f (r x h + (r x h) x h)
+        across = cross(own, half)
+        out[row] = own + factor * (across + cross(across, half))
+    return out

@@ -61,6 +61,7 @@ class Flight(NamedTuple):
         yaw_ref, yaw_rate_ref: (...) in rad and rad/s.
         thrust_applied: u1 (...) (N), mean over the period before.
         torque_applied: [u2, u3, u4] (..., 3) (Nm), likewise.
+        turning_ref: added to the attitude's reference acceleration (..., 3) (rad/s^2), body axes; None for nothing.
     """
 
     position: Array
@@ -75,6 +76,7 @@ class Flight(NamedTuple):
     yaw_rate_ref: Array
     thrust_applied: Array
     torque_applied: Array
+    turning_ref: Array | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -228,7 +230,10 @@ def _attitude_signals(
         # e_q. = w - R_d^T R w_d
         carried = plus(rates, minus(rates, to_body(axes_ref, to_world(flight.axes, rates_ref))))
     q = joined(scaled(-1.0, e))
-    return Signals(q, flight.rates, np.zeros_like(q), joined(carried), joined(feedforward), flight.torque_applied)
+    acceleration = joined(feedforward)
+    if flight.turning_ref is not None:
+        acceleration = acceleration + flight.turning_ref
+    return Signals(q, flight.rates, np.zeros_like(q), joined(carried), acceleration, flight.torque_applied)
 
 
 def _within_reach(gains: CascadeGains, force: Vector) -> Vector:

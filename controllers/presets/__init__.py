@@ -8,13 +8,17 @@ from typing import Any
 import numpy as np
 
 from artde_gym.errors import UnknownNameError, among
+from artde_gym.registration import GainRange
 from controllers.laws.errors import GainError
-from controllers.presets.ojas import OJAS
-from controllers.presets.preset import Preset
-from controllers.presets.q450 import Q450
+from controllers.presets.ojas import OJAS, OJAS_RANGES
+from controllers.presets.preset import Preset, Ranges
+from controllers.presets.q450 import Q450, Q450_RANGES
 
 PRESETS: dict[str, dict[tuple[str, str], Preset]] = {"ojas": OJAS, "q450": Q450}
 """robot -> (law, preset) -> gains; a law's first preset is its default."""
+
+RANGES: dict[str, dict[str, Ranges]] = {"ojas": OJAS_RANGES, "q450": Q450_RANGES}
+"""robot -> law -> where tuning may look for its gains."""
 
 LOOPS = {"position": "p", "attitude": "q"}
 """Fields of a cascade's gains that hold the gains of a loop, and the suffix by which an override names one of those."""
@@ -34,14 +38,7 @@ def preset_gains(robot: str, law: str, preset: str | None, joints: int, override
         UnknownNameError: if the robot has no such law, or the law no such preset.
         GainError: for a gain that the law does not have, or a value that it does not allow.
     """
-    known = PRESETS.get(robot, {})
-    laws = list(dict.fromkeys(name for name, _ in known))
-    if law not in laws:
-        raise UnknownNameError(f"controller of {robot!r}", law, among(law, laws) if laws else "none yet")
-    names = [name for own, name in known if own == law]
-    if preset is not None and preset not in names:
-        raise UnknownNameError(f"preset of {law!r} for {robot!r}", preset, ", ".join(map(repr, names)))
-    gains = known[law, preset or names[0]].gains
+    gains = _preset(robot, law, preset).gains
     flat = _flat(gains)
     for name in overrides:
         if name not in flat:
@@ -51,6 +48,30 @@ def preset_gains(robot: str, law: str, preset: str | None, joints: int, override
         if np.ndim(value) > 0 and np.shape(value)[0] != joints:
             raise GainError(name, value, f"one number, or one for each of the {joints} joints")
     return gains
+
+
+def gain_ranges(robot: str, law: str, preset: str | None) -> dict[str, GainRange]:
+    """Where tuning may look for the gains of a law, from a preset on.
+
+    Raises:
+        UnknownNameError: as `preset_gains`, or for a law whose gains nobody tunes.
+    """
+    gains = _flat(_preset(robot, law, preset).gains)
+    known = RANGES[robot]
+    if law not in known:
+        raise UnknownNameError(f"controller of {robot!r} to be tuned", law, among(law, known))
+    return {name: GainRange(gains[name], low, high) for name, (low, high) in known[law].items()}
+
+
+def _preset(robot: str, law: str, preset: str | None) -> Preset:
+    known = PRESETS.get(robot, {})
+    laws = list(dict.fromkeys(name for name, _ in known))
+    if law not in laws:
+        raise UnknownNameError(f"controller of {robot!r}", law, among(law, laws) if laws else "none yet")
+    names = [name for own, name in known if own == law]
+    if preset is not None and preset not in names:
+        raise UnknownNameError(f"preset of {law!r} for {robot!r}", preset, ", ".join(map(repr, names)))
+    return known[law, preset or names[0]]
 
 
 def _flat(gains: Any) -> dict[str, Any]:

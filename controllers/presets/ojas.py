@@ -8,7 +8,7 @@ from controllers.laws.artde import ArtdeGains
 from controllers.laws.atde import AtdeGains
 from controllers.laws.computed_torque import ComputedTorqueGains
 from controllers.laws.tde import ConstantGains, TdeGains
-from controllers.presets.preset import Preset
+from controllers.presets.preset import Preset, Ranges
 
 _THESIS = "Dantu 2023, section 2.5.2"
 _M_BAR, _K_P, _K_D = 0.042, 25.0, 10.0
@@ -46,3 +46,15 @@ OJAS: dict[tuple[str, str], Preset] = {
     ("computed-torque", "thesis"): Preset(ComputedTorqueGains(_K_P, _K_D), f"{_THESIS}, Kp and Kd"),
 }
 """(law, preset) -> gains."""
+
+_FEEDBACK: Ranges = {"k_p": (5.0, 200.0), "k_d": (3.0, 40.0)}
+_DELAYED: Ranges = {"m_bar": (0.01, 0.08), **_FEEDBACK}
+OJAS_RANGES: dict[str, Ranges] = {
+    "tde": _DELAYED,
+    "pid": _DELAYED,
+    "atde": {**_DELAYED, "alpha": (0.5, 20.0), "gamma_0": (10.0, 5000.0)},
+    "artde": {**_DELAYED, "alpha": (0.5, 20.0), "gamma_0": (10.0, 5000.0), "gamma_1": (10.0, 5000.0)},
+    "tde+c": {**_DELAYED, "alpha": (0.5, 20.0), "c": (0.01, 10.0)},
+    "computed-torque": _FEEDBACK,
+}
+"""Law -> ranges: a decade or so about the thesis' gains."""

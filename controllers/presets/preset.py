@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
+from typing import Any, TypeAlias
 
 
 @dataclasses.dataclass(frozen=True)
@@ -12,3 +12,7 @@ class Preset:
 
     gains: Any
     source: str
+
+
+Ranges: TypeAlias = dict[str, tuple[float, float]]
+"""Gain, named as an override names it -> lowest and highest value for tuning."""

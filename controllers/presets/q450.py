@@ -12,7 +12,7 @@ from controllers.laws.indi import IndiGains
 from controllers.laws.positional_pid import PositionalPidGains
 from controllers.laws.rigid_attitude import RigidAttitudeGains
 from controllers.laws.tde import ConstantGains, TdeGains
-from controllers.presets.preset import Preset
+from controllers.presets.preset import Preset, Ranges
 
 _THESIS = "Dantu 2023, section 3.5.1"
 _M_BAR, _J_BAR, _K_P, _K_D = 1.0, 0.015, 10.0, 5.0
@@ -82,3 +82,27 @@ Q450: dict[tuple[str, str], Preset] = {
     ("tde+kd", "thesis"): Preset(_both(ConstantGains, **_ADAPTIVE, c=0.1), _THESIS),
 }
 """(law, preset) -> gains."""
+
+_FEEDBACK: Ranges = {"k_p_p": (2.0, 60.0), "k_d_p": (1.0, 15.0), "k_p_q": (4.0, 400.0), "k_d_q": (2.0, 50.0)}
+_DELAYED: Ranges = {**_FEEDBACK, "m_bar_p": (0.5, 2.5), "m_bar_q": (0.005, 0.03)}
+_ROBUST: Ranges = {"alpha_p": (0.5, 20.0), "alpha_q": (0.5, 20.0)}
+_GROWTH: Ranges = {"gamma_0_p": (0.05, 50.0), "gamma_0_q": (0.05, 50.0)}
+_INTEGRAL: Ranges = {"k_i_p": (0.5, 60.0), "k_i_q": (1.0, 1000.0)}
+Q450_RANGES: dict[str, Ranges] = {
+    "tde": _DELAYED,
+    "atde": {**_DELAYED, **_ROBUST, **_GROWTH},
+    "artde": {**_DELAYED, **_ROBUST, **_GROWTH, "gamma_1_p": (0.05, 50.0), "gamma_1_q": (0.05, 50.0)},
+    "tde+c": {**_DELAYED, "c_p": (0.01, 10.0), "c_q": (0.01, 10.0)},
+    "pid": {**_FEEDBACK, **_INTEGRAL},
+    "geometric": {**_FEEDBACK, "k_i_p": _INTEGRAL["k_i_p"]},
+    "indi": {**_FEEDBACK, "m_bar_p": (0.5, 2.5), "filter_rate_p": (10.0, 200.0), "filter_rate_q": (10.0, 200.0)},
+    "asmc": {
+        **{f"slope_{loop}": (0.3, 20.0) for loop in "pq"},
+        **{f"k_s_{loop}": (0.3, 20.0) for loop in "pq"},
+        **{f"c_floor_{loop}": (0.01, 10.0) for loop in "pq"},
+        **{f"gamma_c_{loop}": (0.01, 50.0) for loop in "pq"},
+        **{f"eps_{loop}": (1e-4, 1.0) for loop in "pq"},
+        "gamma_r_p": (0.01, 5.0),
+    },
+}
+"""Law -> ranges: a decade or so about gains that fly; the same for what two laws have in common."""

@@ -117,3 +117,26 @@ def drawing_engine(engine_name: EngineName) -> EngineName:
         except OptionError as error:
             pytest.skip(str(error))
     return engine_name
+
+
+def pilot(observation: np.ndarray) -> np.ndarray:
+    """A plain cascade of PD loops for the quadrotor's observations (..., 41)."""
+    position, velocity, rates = observation[..., 0:3], observation[..., 3:6], observation[..., 15:18]
+    rot = observation[..., 6:15].reshape(*observation.shape[:-1], 3, 3)
+    acceleration = observation[..., 24:27] + 5.0 * (observation[..., 18:21] - position)
+    acceleration = acceleration + 4.0 * (observation[..., 21:24] - velocity) + np.array([0.0, 0.0, 9.81])
+    up = acceleration / np.linalg.norm(acceleration, axis=-1, keepdims=True)
+    ahead = np.cross([0.0, 1.0, 0.0], up)
+    ahead = ahead / np.linalg.norm(ahead, axis=-1, keepdims=True)
+    wanted = np.stack([ahead, np.cross(up, ahead), up], axis=-1)
+    skew = np.swapaxes(wanted, -1, -2) @ rot
+    skew = 0.5 * (skew - np.swapaxes(skew, -1, -2))
+    error = np.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], axis=-1)
+    thrust = 1.48 * (acceleration * rot[..., :, 2]).sum(axis=-1, keepdims=True)
+    return np.concatenate([thrust, np.array([0.0125, 0.0125, 0.0225]) * (-60.0 * error - 12.0 * rates)], axis=-1)
+
+
+@pytest.fixture(name="pilot", scope="session")
+def _pilot():
+    """A controller of the quadrotor that owes nothing to the project's."""
+    return pilot

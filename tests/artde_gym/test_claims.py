@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 from artde_gym.evaluation import SCENARIOS, Result, statistics, thesis
-from artde_gym.evaluation.claims import CLAIMS, adapts, falls, improves, judge, repeats
+from artde_gym.evaluation.claims import CLAIMS, adapts, falls, improves, judge, ordered, repeats
 from artde_gym.evaluation.console import print_claims
 
 
@@ -91,6 +91,72 @@ def test_adaptation_against_the_equivalent_gain() -> None:
     )
     assert adapts("S", "tde+kd", "rmse_deg")(episodes({"artde": 0.8, "tde+kd": 1.0}, {"tde+kd": 13})).outcome == "holds"
     assert adapts("S", "tde+kd", "rmse_deg")(episodes({"artde": 1.0})).outcome == "not measured"
+
+
+def flights(errors: dict[str, float], scenario: str = "Q1", n: int = 20, crash: str = "") -> Result:
+    """Paired flights whose errors on every axis, and peaks after the drop, scatter by 5 % about `errors`."""
+    rng = np.random.default_rng(0)
+    rows: list[dict[str, Any]] = []
+    for episode in range(n):
+        air = rng.normal(1.0, 0.05)
+        for name, error in errors.items():
+            row: dict[str, Any] = {"scenario": scenario, "controller": name, "episode": episode, "seed": episode}
+            row |= {"fell": name == crash, "time_to_fall_s": np.nan, "duration_s": 70.0}
+            columns = [f"{metric}_m_{axis}" for metric in ("rmse", "max_abs_error") for axis in thesis.POSITION]
+            columns += [f"{metric}_deg_{axis}" for metric in ("rmse", "max_abs_error") for axis in thesis.ATTITUDE]
+            for column in (*columns, "peak_error_m_drop", "rmse_m"):
+                row[column] = error * air * rng.normal(1.0, 0.01)
+            rows.append(row)
+    return Result(pd.DataFrame(rows))
+
+
+def test_order_of_three() -> None:
+    names = ("artde", "atde", "tde")
+    errors = {"artde": 1.0, "atde": 1.1, "tde": 1.2}
+    verdict = ordered("Q1", names, "rmse_m")(flights(errors))
+    assert verdict.outcome == "holds"
+    assert verdict.measured.startswith("artde below atde by +9")
+    assert ordered("Q1", names, "rmse_m")(flights(errors | {"tde": 1.0})).outcome == "does not hold"
+    assert ordered("Q1", names, "rmse_m")(flights(errors | {"tde": 1.1})).outcome == "undecided"
+    assert ordered("Q1", names, "rmse_m")(flights(errors, crash="tde")).outcome == "not measured"
+    assert ordered("Q1", names, "rmse_m")(flights({"tde": 1.0})).outcome == "not measured"
+
+
+def outcomes(result: Result) -> dict[str, str]:
+    verdicts = judge(result, [claim for claim in CLAIMS if claim.scenario in result.scenarios])
+    return dict(zip(verdicts["claim"], verdicts["verdict"], strict=True))
+
+
+def test_the_quadrotors_claims() -> None:
+    """With ARTDE's errors at 60 % of ATDE's and 80 % of ASMC's, and worse than a TDE that does not adapt."""
+    verdicts = outcomes(flights({"artde": 0.6, "atde": 1.0, "asmc": 0.75, "tde": 0.7, "tde+kd": 0.5}))
+    assert verdicts["nobody crashes"] == "holds"
+    better = {claim: verdict for claim, verdict in verdicts.items() if "by more than 30 %" in claim}
+    assert {claim.split("'s ")[1].split()[-1]: verdict for claim, verdict in better.items()} == {
+        "ATDE": "holds",
+        "ASMC": "does not hold",
+    }
+    for claim, verdict in verdicts.items():
+        if "peak" in claim or "roll and pitch" in claim:
+            assert verdict == "holds", claim
+    assert [verdicts[claim] for claim in verdicts if claim.startswith("adaptation")] == ["holds", "does not hold"]
+    crashed = outcomes(flights({"artde": 0.6, "atde": 1.0, "asmc": 0.75}, crash="artde"))
+    assert crashed["nobody crashes"] == "does not hold"
+    assert crashed["ARTDE sways less than ATDE after the payload's drop (peak error)"] == "not measured"
+    (calm,) = outcomes(flights({"artde": 3.0, "atde": 2.0, "tde": 1.0}, scenario="Q1-calm")).values()
+    assert calm == "does not hold"
+
+
+def test_what_table_31_says_of_its_own_claims() -> None:
+    """The 30 % in y against ASMC do not follow from it, and ASMC's roll error is below ARTDE's."""
+    table = thesis.VALUES["Q1"]
+
+    def better(rival: str, metric: str, axis: str) -> float:
+        return 100 * (1 - table["artde"][metric][axis] / table[rival][metric][axis])
+
+    assert better("asmc", "rmse_m", "y") == pytest.approx(23.1, abs=0.05)
+    assert min(better("atde", "rmse_m", axis) for axis in ("y", "z")) > 30
+    assert better("asmc", "rmse_deg", "phi") < 0
 
 
 def test_improvement_interval_covers_the_truth() -> None:

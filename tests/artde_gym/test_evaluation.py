@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import signal
@@ -14,12 +15,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from rich.console import Console
 from typer.testing import CliRunner
 
 import artde_gym
 from artde_gym.cli import app
+from artde_gym.envs import quadrotor_task
 from artde_gym.errors import ArtdeGymError, DisturbanceError, OptionError, StoreError, UnknownNameError
 from artde_gym.evaluation import SCENARIOS, Result, evaluate, statistics, thesis
+from artde_gym.evaluation.console import print_result
 from artde_gym.evaluation.evaluate import Update, episode_seed
 from controllers import GainError
 
@@ -52,6 +56,22 @@ def test_bootstrap_interval_covers_the_mean_as_often_as_it_says() -> None:
         estimate = statistics.mean(rng.normal(3.0, 1.0, size=40))
         inside += estimate.low <= 3.0 <= estimate.high
     assert 0.88 <= inside / 200 <= 0.99
+
+
+def test_intervals_of_many_values_join_those_of_few() -> None:
+    """Beyond `MANY` values the central limit's interval takes over from the bootstrap's."""
+    rng = np.random.default_rng(0)
+    theirs = rng.gamma(4.0, size=statistics.MANY)
+    ours = 0.8 * theirs + 0.2 * rng.normal(size=statistics.MANY)
+    more = [np.append(values, values.mean()) for values in (ours, theirs)]
+    for few, many in (
+        (statistics.mean(ours), statistics.mean(more[0])),
+        (statistics.improvement(ours, theirs), statistics.improvement(*more)),
+    ):
+        assert many.n == few.n + 1 > statistics.MANY
+        assert many.value == pytest.approx(few.value, rel=1e-2)
+        for bound in ("low", "high"):
+            assert getattr(many, bound) == pytest.approx(getattr(few, bound), abs=0.06 * (few.high - few.low))
 
 
 def test_mean_of_few_and_of_broken_values() -> None:
@@ -221,6 +241,8 @@ def test_folder_holds_what_the_documentation_says(tmp_path: Path) -> None:
     assert traces["time"] == pytest.approx(0.008 * np.arange(51))  # 125 Hz is the nearest whole stride of 4 ms
     assert traces["q"].shape == (51, 12)
     assert {"policy.sigma", "policy.s", "policy.beta_0", "policy.beta_1"} <= set(traces)
+    assert traces["foot_loads"].shape == (51, 2)
+    assert traces["foot_loads"].sum(axis=1).mean() == pytest.approx(9.81 * (8.986 + 1.3), rel=0.05)  # it stands
 
 
 def test_traces_at_full_rate_on_request(tmp_path: Path) -> None:
@@ -296,6 +318,44 @@ def test_command_prints_ours_beside_the_thesis(tmp_path: Path) -> None:
     listing = CliRunner().invoke(app, ["list"]).output
     for word in ("BipedWalk-Payload-v0", "S2-L4", "artde-robust", "computed-torque"):
         assert word in listing
+
+
+def test_reproduce_runs_both_robots(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("S1", "Q1"):
+        monkeypatch.setitem(SCENARIOS, name, dataclasses.replace(SCENARIOS[name], kwargs={"duration": 0.2}))
+    arguments = ["reproduce", "--scenario", "S1,Q1", "--episodes", "1", "--workers", "1", "--out", str(tmp_path)]
+    outcome = CliRunner().invoke(app, arguments)
+    assert outcome.exit_code == 0, outcome.output
+    for word in ("S1: walk", "Table 2.1", "Q1: infinity", "Table 3.1", "nobody crashes", "geometric"):
+        assert word in outcome.output
+    assert set(pd.read_csv(tmp_path / "biped" / "claims.csv")["scenario"]) == {"S1"}
+    assert set(pd.read_csv(tmp_path / "quadrotor" / "claims.csv")["scenario"]) == {"Q1"}
+    assert CliRunner().invoke(app, [*arguments, "--robot", "biped"]).output.count("Table 3.1") == 0
+    assert run_command("reproduce", "--robot", "bipedal").returncode == 2
+
+
+def test_a_recovery_that_never_came_is_counted() -> None:
+    rows = [
+        {"scenario": "custom", "controller": "artde", "env": "QuadInfinity-Payload-v0", "episode": i, "seed": i}
+        | {"fell": False, "time_to_fall_s": np.nan, "duration_s": 1.0, "recovery_time_s_drop": time}
+        | {"peak_error_m_drop": 0.25}
+        for i, time in enumerate((1.0, 2.0, np.inf))
+    ]
+    tracking = quadrotor_task.TRACKING
+    for row in rows:
+        row |= {
+            f"{metric}_{tracked.unit}_{axis}": 0.1
+            for metric in ("rmse", "max_abs_error")
+            for tracked in tracking.errors
+            for axis in tracked.axes
+        }
+        row |= {f"rms_{effort.name}_{effort.unit}_{axis}": 0.1 for effort in tracking.efforts for axis in effort.axes}
+        row["rmse_m"] = 0.1
+    console = Console(record=True, width=100)
+    print_result(Result(pd.DataFrame(rows)), console)
+    text = console.export_text()
+    assert "1.50 (1 never)" in text
+    assert "0.2500" in text
 
 
 def run_command(*arguments: str) -> subprocess.CompletedProcess[str]:

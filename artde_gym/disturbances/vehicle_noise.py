@@ -1,0 +1,39 @@
+"""The disturbance `sensor_noise` on what a vehicle measures of itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from artde_gym.arrays import Array
+from artde_gym.disturbances.noise import Integers, normal_noise
+from artde_gym.sim.rigid_bodies import turned
+
+
+class VehicleNoise:
+    """White Gaussian noise for `n` vehicles, each with its own standard deviations."""
+
+    def __init__(self, n: int, dtype: DTypeLike) -> None:
+        self._deviations = np.zeros((len(_NAMES), n), dtype)
+
+    def begin(self, vehicle: int, realised: Mapping[str, Any]) -> None:
+        """Begin an episode of one vehicle, with realised disturbances."""
+        noise = realised.get("sensor_noise", {})
+        self._deviations[:, vehicle] = [noise.get(name, 0.0) for name in _NAMES]
+
+    def measure(
+        self, position: Array, velocity: Array, rot: Array, rates: Array, sample: NDArray[np.int64], keys: Integers
+    ) -> None:
+        """Add noise in place; arguments as in `artde_gym.disturbances.mocap.Mocap.measure`."""
+        noise = normal_noise(keys, sample.astype(np.uint64), 12).astype(position.dtype)
+        of_position, of_velocity, of_attitude, of_rates = self._deviations
+        position += of_position * noise[0:3]
+        velocity += of_velocity * noise[3:6]
+        np.copyto(rot, turned(rot, of_attitude * noise[6:9]), where=of_attitude > 0)
+        rates += of_rates * noise[9:12]
+
+
+_NAMES = ("position", "velocity", "tilt", "angular_velocity")
