@@ -48,8 +48,8 @@ class Coupling(Protocol):
         """The acceleration du (..., n) for one control period, and memory."""
         ...
 
-    def reward_terms(self, observation: Array, action: Array, fell: Any) -> dict[str, Array]:
-        """Terms of the reward of one decision by name, at its end; weighted by `reward_scales`."""
+    def reward_terms(self, observation: Array, memory: Any, fell: Any) -> dict[str, Array]:
+        """Terms of the reward of one decision by name, at its end, observed already; weighted by `reward_scales`."""
         ...
 
 

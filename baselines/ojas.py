@@ -220,8 +220,8 @@ class OjasCoupling:
         du = (after.rate - before.rate) / self._period + K_D * before.rate + K_P * before.value
         return np.minimum(np.maximum(du, -self._limit), self._limit), memory._replace(filter=after)
 
-    def reward_terms(self, observation: Array, action: Array, fell: Any) -> dict[str, Array]:
-        at = self._at
+    def reward_terms(self, observation: Array, memory: OjasMemory, fell: Any) -> dict[str, Array]:
+        at, action = self._at, memory.action
         tilt, velocity = observation[..., at["tilt"]], observation[..., at["base_velocity"]]
         e = observation[..., at["q_ref"]] - observation[..., at["q"]]
         too_fast = velocity[..., :2] - np.array([0.1, 0.0])

@@ -67,7 +67,10 @@ class Residual:
 
     def observe(self, observation: Array, memory: ResidualMemory) -> tuple[Array, ResidualMemory]:
         """What the agent sees (..., n_features), and memory."""
-        inside = self.base.diagnostics(memory.base)
+        inside = {
+            **self.base.diagnostics(memory.base),
+            **self.base.upcoming(memory.base, self.base.read(observation)),
+        }
         features, coupling = self.coupling.observe(observation, inside, memory.coupling)
         return features, memory._replace(coupling=coupling)
 
@@ -125,6 +128,10 @@ class ResidualPolicy(Policy):
             residual = decided if due.all() else choose(due, decided, residual)
         force, residual = self.residual.control(observation, residual, signals.du)
         return force, PolicyMemory(residual, (memory.count + 1) % self.residual.periods)
+
+    def upcoming(self, state: Any, signals: _Signals) -> dict[str, Array]:
+        base = self.residual.base
+        return base.upcoming(state.residual.base, base.read(signals.observation))
 
     def diagnostics(self, state: Any) -> dict[str, Array]:
         """What the base tells, and the agent's `action` and, on the biped, `gate`."""

@@ -87,11 +87,12 @@ class ResidualEnv(gym.Wrapper[Float, Float, NDArray[Any], NDArray[Any]]):
         if events:
             info["events"] = events
         self._memory = memory
+        features = self._features()
         coupling = self.residual.coupling
-        terms = coupling.reward_terms(self._observation, action, terminated)
+        terms = coupling.reward_terms(self._observation, self._memory.coupling, terminated)
         info["residual_terms"] = {name: float(value) for name, value in terms.items()}
         reward = float(total(coupling.reward_scales, terms))
-        return self._features(), reward, bool(terminated), bool(truncated), info
+        return features, reward, bool(terminated), bool(truncated), info
 
     def _features(self) -> Float:
         assert self._memory is not None

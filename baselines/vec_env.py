@@ -69,10 +69,10 @@ class ResidualVecEnv(VecEnv):
         memory = self.residual.decide(self._memory, self._action)
         force, self._memory = self.residual.control(self._observation, memory)
         self._observation, _, terminated, truncated, _ = self.env.step(force)
-        coupling = self.residual.coupling
-        terms = coupling.reward_terms(self._observation, self._action, terminated)
-        rewards = total(coupling.reward_scales, terms).astype(np.float32)
         features = self._features()
+        coupling = self.residual.coupling
+        terms = coupling.reward_terms(self._observation, self._memory.coupling, terminated)
+        rewards = total(coupling.reward_scales, terms).astype(np.float32)
         done = terminated | truncated
         infos = list(self._infos)
         if done.any():

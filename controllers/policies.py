@@ -113,6 +113,11 @@ class Policy(abc.ABC):
         """What the memory tells of the law's inside, by name: sigma, s, beta, c, ..., as far as it has them."""
         return flatten(state)
 
+    def upcoming(self, state: Memory, signals: Any) -> dict[str, Array]:
+        """Signals inside that the next step is about to see, by name, where the observation alone does not tell them."""
+        del state, signals
+        return {}
+
 
 class TrackingPolicy(Policy):
     """A law on the joints' `Signals`, each a field of the observation."""

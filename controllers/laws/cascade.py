@@ -34,7 +34,7 @@ import numpy as np
 from controllers.laws.attitude import attitude_error, desired_axes, desired_rates, heading
 from controllers.laws.errors import GainError
 from controllers.laws.second_order import FilterMemory, second_order
-from controllers.laws.tracking import Array, Law, Signals, check_positive_number, is_finite, times
+from controllers.laws.tracking import Array, Law, Signals, check_positive_number, errors, is_finite, times
 from controllers.laws.vectors import (
     Axes,
     Vector,
@@ -176,6 +176,12 @@ def cascade(
     thrust = dot(reachable, flight.axes[2])
     wrench = joined((thrust, *components(torque)))
     return wrench, CascadeMemory(position_memory, attitude_memory, command, force, flight.axes, axes_ref)
+
+
+def attitude_errors(gains: CascadeGains, memory: CascadeMemory, flight: Flight) -> tuple[Array, Array]:
+    """e_q and e_w (..., 3) that the attitude law is about to see, for the command "filtered" exactly."""
+    axes_ref, rates_ref = _attitude_command(memory.command, flight, 0.0)
+    return errors(_attitude_signals(gains, flight, axes_ref, rates_ref, scaled(0.0, rates_ref)))
 
 
 def _position_signals(flight: Flight, applied: Array) -> Signals:
