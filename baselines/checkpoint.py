@@ -31,7 +31,10 @@ class Checkpoints:
         part = self.folder / "part"
         shutil.rmtree(part, ignore_errors=True)
         part.mkdir()
-        torch.save(model.get_parameters(), part / "parameters.pt")
+        parameters = model.get_parameters()
+        if hasattr(model, "log_ent_coef"):
+            parameters["log_ent_coef"] = model.log_ent_coef.detach()  # no parameter of SAC's policy
+        torch.save(parameters, part / "parameters.pt")
         statistics = {"observation": normaliser.obs_rms, "return": normaliser.ret_rms}
         arrays = {
             f"{name}_{key}": getattr(values, key) for name, values in statistics.items() for key in _STATISTICS
@@ -59,7 +62,10 @@ class Checkpoints:
         if not numbered:
             return None
         folder = numbered[-1]
-        model.set_parameters(torch.load(folder / "parameters.pt", weights_only=True), device="cpu")
+        parameters = torch.load(folder / "parameters.pt", weights_only=True)
+        if "log_ent_coef" in parameters:
+            model.log_ent_coef.data.copy_(parameters.pop("log_ent_coef"))
+        model.set_parameters(parameters, device="cpu")
         with np.load(folder / "normaliser.npz", allow_pickle=False) as arrays:
             for name, values in {"observation": normaliser.obs_rms, "return": normaliser.ret_rms}.items():
                 for key in _STATISTICS:

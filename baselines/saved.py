@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from pathlib import Path
 from typing import Any, get_args
 
@@ -10,6 +9,7 @@ from artde_gym.envs import biped, quadrotor_task
 from artde_gym.errors import UnknownNameError, among
 from artde_gym.robots.ojas import ActuatorInertia, ojas
 from artde_gym.robots.q450 import q450
+from artde_gym.robots.spec import RobotSpec
 from baselines.errors import PolicyFileError
 from baselines.policy_file import DESCRIPTION, Saved, layout_hash, read
 from baselines.residual import Residual, ResidualPolicy
@@ -65,23 +65,18 @@ class _Trained:
         self.robot_name = saved.recipe.robot
         self.observation_layout, self.action_layout = task.OBSERVATION, task.ACTION
         self.control_period = saved.control_period
-        self.nominal_robot = _nominal_robot(saved.nominal)
+        self.nominal_robot = _nominal_robot(self.robot_name, saved.nominal)
 
     @property
     def unwrapped(self) -> _Trained:
         return self
 
 
-@functools.cache
-def _nominal_robot(name: str) -> Any:
-    return q450() if name == "q450" else ojas(_actuators(name))
-
-
-def _actuators(name: str) -> ActuatorInertia:
-    for known in get_args(ActuatorInertia):
-        if name == f"ojas {known}":
-            return known
-    raise PolicyFileError("nominal_robot", name, "'q450', 'ojas rotor', 'ojas lumped', 'ojas none'")
+def _nominal_robot(robot: str, name: str) -> RobotSpec:
+    known = {"q450": q450} if robot == "q450" else {f"ojas {kind}": ojas for kind in get_args(ActuatorInertia)}
+    if name not in known:
+        raise PolicyFileError("nominal_robot", name, ", ".join(map(repr, known)))
+    return known[name](*name.split()[1:])
 
 
 def nominal_name(robot: str, env_kwargs: dict[str, Any]) -> str:

@@ -232,7 +232,7 @@ def test_the_actor_is_asked_once_a_decision_and_each_environment_by_its_own_cloc
 
     def actor(features):
         asked.append(len(features))
-        return np.zeros((*features.shape[:-1], 6))
+        return np.zeros((*features.shape[:-1], 3))
 
     policy = ResidualPolicy("x", Plant.of(env), residual, actor)
     observation, _ = env.reset(seed=0)
@@ -279,10 +279,10 @@ def test_no_base_gives_the_force_itself():
 def test_actions_are_checked():
     env = ResidualEnv(make("QuadInfinity-Payload-v0"), Recipe("q450"))
     with pytest.raises(gym.error.ResetNeeded):
-        env.step(np.zeros(6))
+        env.step(np.zeros(3))
     env.reset(seed=0)
     with pytest.raises(ActionError, match="shape of the action"):
         env.step(np.zeros(5))
     with pytest.raises(ActionError, match="finite"):
-        env.step(np.full(6, np.nan))
+        env.step(np.full(3, np.nan))
     env.close()

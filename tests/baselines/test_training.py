@@ -154,7 +154,7 @@ def test_the_adapter_steps_each_vehicle_as_a_single_batch_would():
     ends = 0
     for _ in range(25):
         np.testing.assert_array_equal(together[1], alone[0])
-        actions = rng.uniform(-1, 1, (2, 6)).astype("f4")
+        actions = rng.uniform(-1, 1, (2, 3)).astype("f4")
         together, rewards, done, infos = pair.step(actions)
         alone, reward, done_alone, infos_alone = one.step(actions[1:])
         assert (rewards[1], done[1]) == (reward[0], done_alone[0])
@@ -174,7 +174,7 @@ def test_the_adapter_is_what_the_single_environment_is():
     single = ResidualEnv(gym.make(QUADROTOR, disable_env_checker=True, duration=2.0, disturbances={}), Recipe("q450"))
     many, one = vector.reset(), single.reset(seed=0)[0]
     for k in range(60):
-        action = 0.5 * np.sin(0.2 * k + np.arange(6.0)).astype("f4")
+        action = 0.5 * np.sin(0.2 * k + np.arange(3.0)).astype("f4")
         many, rewards, *_ = vector.step(action[None])
         one, reward, *_ = single.step(action)
     np.testing.assert_allclose(many[0], one, rtol=0, atol=5e-3)
