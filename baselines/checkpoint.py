@@ -36,9 +36,7 @@ class Checkpoints:
             parameters["log_ent_coef"] = model.log_ent_coef.detach()  # no parameter of SAC's policy
         torch.save(parameters, part / "parameters.pt")
         statistics = {"observation": normaliser.obs_rms, "return": normaliser.ret_rms}
-        arrays = {
-            f"{name}_{key}": getattr(values, key) for name, values in statistics.items() for key in _STATISTICS
-        }
+        arrays = {f"{name}_{key}": getattr(values, key) for name, values in statistics.items() for key in _STATISTICS}
         np.savez(part / "normaliser.npz", **arrays)
         if hasattr(model, "replay_buffer"):
             buffer = model.replay_buffer
@@ -49,7 +47,7 @@ class Checkpoints:
                 full=buffer.full,
                 **{name: getattr(buffer, name)[:filled] for name in _BUFFER},
             )
-        (part / "state.json").write_text(json.dumps({**state, "updates": model._n_updates}, indent=1))  # noqa: SLF001
+        (part / "state.json").write_text(json.dumps({**state, "updates": model._n_updates}, indent=1))
         final = self.folder / f"{state['interval']:06d}"
         shutil.rmtree(final, ignore_errors=True)
         os.replace(part, final)
@@ -79,7 +77,7 @@ class Checkpoints:
                     getattr(buffer, name)[: len(arrays[name])] = arrays[name]
         state = json.loads((folder / "state.json").read_text())
         model.num_timesteps = state["steps"]
-        model._n_updates = state["updates"]  # noqa: SLF001  # Stable-Baselines3 has no other way in
+        model._n_updates = state["updates"]  # Stable-Baselines3 has no other way in
         return state
 
     def _numbered(self) -> list[Path]:

@@ -104,7 +104,7 @@ class OjasCoupling:
         self._gains = (gains.k_p, gains.k_d) if hasattr(gains, "k_p") else None
         self._mirror = Mirror(plant.observation)
         self._at = plant.observation.slices
-        self.actions = tuple(RANGES) if self._synergies else tuple(f"q{i + 1}" for i in range(JOINTS))
+        self.actions: tuple[str, ...] = tuple(RANGES) if self._synergies else tuple(f"q{i + 1}" for i in range(JOINTS))
         self.features = Layout(
             (
                 Field("tilt", 2, "rad", -1.0, 1.0, "roll and pitch of the base"),
@@ -139,9 +139,7 @@ class OjasCoupling:
             FilterMemory(nothing, nothing),
         )
 
-    def observe(
-        self, observation: Array, inside: Mapping[str, Array], memory: OjasMemory
-    ) -> tuple[Array, OjasMemory]:
+    def observe(self, observation: Array, inside: Mapping[str, Array], memory: OjasMemory) -> tuple[Array, OjasMemory]:
         at = self._at
         right = observation[..., at["load_left_ref"].start] < 0.5
         seen = np.where(right[..., None], self._mirror(observation), observation)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import io
+import itertools
 import json
 import os
 import zipfile
@@ -124,7 +125,7 @@ def _network(content: bytes, sizes: list[int], squashed: bool) -> Network:
     with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
         layers = tuple(
             (checked(f"weight_{i}", (before, after)), checked(f"bias_{i}", (after,)))
-            for i, (before, after) in enumerate(zip(sizes[:-1], sizes[1:], strict=True))
+            for i, (before, after) in enumerate(itertools.pairwise(sizes))
         )
         return Network(checked("mean", (sizes[0],)), checked("variance", (sizes[0],)), layers, squashed)
 

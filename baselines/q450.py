@@ -64,6 +64,7 @@ class Q450Coupling:
 
     def __init__(self, plant: Plant, recipe: Recipe, gains: Any) -> None:
         torque = recipe.base == NO_BASE
+        self.actions: tuple[str, ...]
         if torque:
             self.actions = ("u1", "u2", "u3", "u4")
             box = plant.action.box()
@@ -76,7 +77,7 @@ class Q450Coupling:
             self.actions = AXES + TURNS if whole else TURNS
             self._limit = recipe.limit * np.repeat([1.0, TURNING] if whole else [TURNING], 3)
         self._attitude_alone = recipe.channel == "attitude" and not torque
-        loop = getattr(gains, "position", None)
+        loop: Any = getattr(gains, "position", None)
         self._gains = (loop.k_p, loop.k_d) if hasattr(loop, "k_p") else None
         self._at = plant.observation.slices
         own = [field for field in plant.observation.fields if field.name in PASSED_ON]
@@ -101,10 +102,7 @@ class Q450Coupling:
         nothing = np.zeros((*observation.shape[:-1], 3), observation.dtype)
         return Q450Memory(np.zeros((*nothing.shape[:-1], len(self.actions)), observation.dtype), nothing, nothing)
 
-    def observe(
-        self, observation: Array, inside: Mapping[str, Array], memory: Q450Memory
-    ) -> tuple[Array, Q450Memory]:
-        at = self._at
+    def observe(self, observation: Array, inside: Mapping[str, Array], memory: Q450Memory) -> tuple[Array, Q450Memory]:
         e, ed = self._errors(observation)
         nothing = np.zeros_like(e)
         s = nothing if self._gains is None else sliding_variable(e, ed, *self._gains)

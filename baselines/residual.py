@@ -93,7 +93,7 @@ class PolicyMemory(NamedTuple):
     """Of the residual, and the control periods since the last decision (...)."""
 
     residual: ResidualMemory
-    count: NDArray[np.int64]
+    since: NDArray[np.int64]
 
 
 class ResidualPolicy(Policy):
@@ -121,13 +121,13 @@ class ResidualPolicy(Policy):
         return PolicyMemory(self.residual.start(observation), np.zeros(observation.shape[:-1], np.int64))
 
     def step(self, memory: Any, signals: _Signals, observation: Array) -> tuple[Array, Memory]:
-        residual, due = memory.residual, memory.count == 0
+        residual, due = memory.residual, memory.since == 0
         if due.any():
             features, seen = self.residual.observe(observation, residual)
             decided = self.residual.decide(seen, self.actor(features))
             residual = decided if due.all() else choose(due, decided, residual)
         force, residual = self.residual.control(observation, residual, signals.du)
-        return force, PolicyMemory(residual, (memory.count + 1) % self.residual.periods)
+        return force, PolicyMemory(residual, (memory.since + 1) % self.residual.periods)
 
     def upcoming(self, state: Any, signals: _Signals) -> dict[str, Array]:
         base = self.residual.base

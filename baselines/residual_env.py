@@ -18,7 +18,7 @@ from controllers.laws.tracking import Array
 Float = NDArray[np.float32]
 
 
-class ResidualEnv(gym.Wrapper[Float, Float, NDArray[Any], NDArray[Any]]):
+class ResidualEnv(gym.Wrapper[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]):
     """An environment of this project under a base controller, whose residual is the action.
 
     One step is one decision: `Recipe.hold` seconds, in which the base controls at its own rate. Zero action is the base

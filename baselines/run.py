@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import gymnasium as gym
+import numpy as np
 
 import artde_gym
 from artde_gym.errors import among
@@ -28,6 +29,7 @@ from baselines.tasks import HELD_OUT, task
 ALGORITHMS = ("ppo", "sac", "cma-es")
 LABELS = {"cma-es": "balance"}
 """What stands behind the base's name in that of a policy, where it is not the algorithm."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Training:
@@ -85,7 +87,6 @@ class Progress(NamedTuple):
     text: str
 
 
-
 class Run:
     """A run in its folder.
 
@@ -101,9 +102,7 @@ class Run:
         TrainingError: if the folder holds a run of another configuration.
     """
 
-    def __init__(
-        self, training: Training, folder: Path, on_progress: Callable[[Progress], None] | None = None
-    ) -> None:
+    def __init__(self, training: Training, folder: Path, on_progress: Callable[[Progress], None] | None = None) -> None:
         self.training, self.folder, self.task = training, folder, task(training.env_id)
         self._on_progress = on_progress or (lambda _: None)
         self.state: dict[str, Any] = {"best": None, "stale": 0, "tests": []}
@@ -154,7 +153,7 @@ class Run:
             backend="batch" if self.task.batched else "single",
         ).episodes
         score = self.task.score(rows)
-        means = {name: float(rows[name].mean()) for name in _SHOWN if name in rows}
+        means = {name: float(np.mean(rows[name].to_numpy())) for name in _SHOWN if name in rows}
         found = {"steps": steps, "score": score, **means, **more}
         state["tests"].append(found)
         _write_rows(self.folder / "learning_curve.csv", state["tests"])

@@ -100,12 +100,14 @@ def _pushed(level: float, payload: float, unpushed: int) -> dict[str, Any]:
 
 def _survival(rows: pd.DataFrame) -> float:
     """Share of episodes without a fall, and a little for a long time before one."""
-    return float(1.0 - rows["fell"].mean() + 0.1 * rows["duration_s"].mean() / rows["duration_s"].max())
+    fell, duration = np.asarray(rows["fell"], np.float64), np.asarray(rows["duration_s"], np.float64)
+    return float(1.0 - fell.mean() + 0.1 * duration.mean() / duration.max())
 
 
 def _accuracy(rows: pd.DataFrame) -> float:
     """Minus the RMS position error (m), plus a metre for a crash."""
-    return float(-(rows["rmse_m"] + rows["fell"]).mean())
+    fell, error = np.asarray(rows["fell"], np.float64), np.asarray(rows["rmse_m"], np.float64)
+    return float(-(error + fell).mean())
 
 
 _FLIGHT_PPO = {

@@ -86,7 +86,7 @@ class _Trainer:
         set_random_seed(seed)
         self.env.seed(env_seed)
         self.env.set_options({"disturbances": run.task.training(self.level)})
-        model._last_obs = None  # noqa: SLF001  # so that `learn` resets the environments
+        model._last_obs = None  # so that `learn` resets the environments
         watcher, began = _Watcher(self._report), time.perf_counter()
         wanted = min(self.interval, run.training.steps - self.steps)
         model.learn(wanted, callback=watcher, reset_num_timesteps=False, log_interval=1)
@@ -136,9 +136,7 @@ def _environments(training: Training, run: Run) -> tuple[VecEnv, Residual]:
     if task.batched:
         kwargs.pop("engine", None)  # it is one
         count = training.envs or task.envs or 1
-        batch = gym.make_vec(
-            training.env_id, count, vectorization_mode="vector_entry_point", dtype="float32", **kwargs
-        )
+        batch = gym.make_vec(training.env_id, count, vectorization_mode="vector_entry_point", dtype="float32", **kwargs)
         env = ResidualVecEnv(batch, training.recipe)
         return env, env.residual
     count = training.envs or training.workers

@@ -1,6 +1,6 @@
 """Tuning the linear balance law by an evolution strategy (CMA-ES, Hansen 2016), in generations that can be continued.
 
-Every generation meets the same new pushes with all of its candidates. What is judged on held-out seeds, and exported, is
+Every generation meets the same new pushes with all of its candidates. What is judged on held-out seeds and exported is
 the mean of the distribution. The state is the list of values told so far: telling them again gives the same generator.
 """
 
@@ -85,16 +85,14 @@ _kept: dict[str, ResidualEnv] = {}
 """A worker's environment; building one takes a second."""
 
 
-def _judge(
-    env_id: str, kwargs: dict[str, Any], recipe: Recipe, network: Any, seeds: list[int]
-) -> tuple[float, int]:
+def _judge(env_id: str, kwargs: dict[str, Any], recipe: Recipe, network: Any, seeds: list[int]) -> tuple[float, int]:
     """Share of falls, a little less for late ones and for small actions, and decisions taken."""
     if env_id not in _kept:
         _kept[env_id] = single(env_id, kwargs, recipe)
     env, cost, steps = _kept[env_id], 0.0, 0
     for seed in seeds:
         features, _ = env.reset(seed=int(seed))
-        over, count, effort = False, 0, 0.0
+        terminated, over, count, effort = False, False, 0, 0.0
         while not over:
             action = network(features)
             features, _, terminated, truncated, _ = env.step(action)

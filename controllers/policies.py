@@ -114,7 +114,7 @@ class Policy(abc.ABC):
         return flatten(state)
 
     def upcoming(self, state: Memory, signals: Any) -> dict[str, Array]:
-        """Signals inside that the next step is about to see, by name, where the observation alone does not tell them."""
+        """What the next step is about to see, by name, where the observation alone does not tell it."""
         del state, signals
         return {}
 
