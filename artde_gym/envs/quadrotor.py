@@ -27,13 +27,13 @@ from artde_gym.robots import q450 as robot
 from artde_gym.robots.spec import Vector
 from artde_gym.sim.engine import Camera, Engine
 from artde_gym.sim.factory import EngineName, make_engine
+from artde_gym.sim.rotation import matrix
 
 TIME_STEP = 0.001  # s, of the physics
 STEPS = 5  # physics steps from one grid point to the next
 
 _NOTHING = (0.0, 0.0, 0.0)
 _NO_JOINTS = np.zeros(0)
-_WRENCH, _THRUST = task.OBSERVATION["wrench_applied"], task.OBSERVATION["rotor_thrust"]
 
 
 @filled(shared=task.DOCUMENTATION)
@@ -46,7 +46,7 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
     `vectorization_mode="vector_entry_point"` gives thousands of the same in NumPy (`artde_gym.envs.quadrotor_batch`).
 
     {shared}
-    | `engine` | "bullet" | "bullet" | physics engine |
+    | `engine` | "bullet" | "bullet", "mujoco" | physics engine; see docs/engines.md |
 
     `reset(options={{"disturbances": ..., "scenario": "Q1"}})` replaces the disturbances of this and the following
     episodes, by a mapping or by those of a named scenario.
@@ -94,7 +94,8 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         self._last = len(self._plan) - 1
         self.observation_space = task.OBSERVATION.box()
         self.action_space = task.ACTION.box()
-        self._engine: Engine = make_engine(engine, self.nominal_robot, TIME_STEP)
+        self._low, self._high = self.action_space.low, self.action_space.high
+        self._engine: Engine = make_engine(engine, self.nominal_robot, TIME_STEP, renders=render_mode is not None)
         self._engine.place(START, _NO_JOINTS)
         self._placed = self._engine.snapshot()
         self._over = True  # no step before the first reset
@@ -126,11 +127,10 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         action = np.asarray(action, dtype=np.float64)
         if action.shape != (4,):
             raise ActionError("shape of the action", action.shape, "(4,)")
-        command = action.tolist()
-        if not math.isfinite(sum(map(abs, command))):
-            raise ActionError("action", command, "finite [u1 (N), u2, u3, u4 (Nm)]")
+        if not all(map(math.isfinite, action.tolist())):
+            raise ActionError("action", action.tolist(), "finite [u1 (N), u2, u3, u4 (Nm)]")
         before = self._rotors.thrusts
-        events = self._simulate(command)
+        events = self._simulate(np.minimum(np.maximum(action, self._low), self._high).tolist())
         self._k += 1
         observation = self._measure()
         terms = self._reward_terms(before)
@@ -138,12 +138,13 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         info: dict[str, Any] = {"time_s": self._k * self.control_period, "reward_terms": terms}
         if events:
             info["events"] = events
-        reasons = [word for word, holds in zip(task.FALL_REASONS, self._falls(), strict=True) if holds]
-        if reasons:
-            info["fall_reason"] = reasons[0]
+        falls = self._falls()
+        terminated = any(falls)
+        if terminated:
+            info["fall_reason"] = task.FALL_REASONS[falls.index(True)]
         truncated = self._k >= self._last
-        self._over = truncated or bool(reasons)
-        return observation, reward, bool(reasons), truncated, info
+        self._over = terminated or truncated
+        return observation, reward, terminated, truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
         """A picture of 640 x 480 from a camera that flies along; None without a render mode."""
@@ -198,7 +199,7 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
 
     def _read(self) -> None:
         self._state = self._engine.read()
-        self._rot = _rotation(self._state.quat_xyzw)
+        self._rot = matrix(self._state.quat_xyzw)
 
     def _drag(self) -> Vector:
         """Force of the air until the next grid point (N), body axes."""
@@ -222,10 +223,11 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         observation[task.MEASURED] = (*state.position, *state.velocity, *rot, *rates)
         plan = self._plan[self._k]
         observation[task.REFERENCE] = plan[:-1]
-        observation[_WRENCH] = self._wrench
-        observation[_THRUST] = self._rotors.thrusts
+        observation[task.WRENCH] = self._wrench
+        observation[task.THRUST] = self._rotors.thrusts
         observation[task.PHASE] = plan[-1]
-        self._sensors.measure(observation[:, None], np.array([self._k]))
+        if not self._sensors.ideal:
+            self._sensors.measure(observation[:, None], np.array([self._k]))
         return observation
 
     def _reward_terms(self, before: Array) -> dict[str, float]:
@@ -240,12 +242,3 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
     def _falls(self) -> tuple[bool, bool, bool]:
         spin = math.hypot(*self._state.angular_velocity) ** 2
         return task.falls(self._state.position, self._rot[8], spin)
-
-
-def _rotation(quat_xyzw: tuple[float, float, float, float]) -> tuple[float, ...]:
-    """The rotation matrix, row by row."""
-    x, y, z, w = quat_xyzw
-    x2, y2, z2 = x + x, y + y, z + z
-    xx, yy, zz, xy, xz, yz = x * x2, y * y2, z * z2, x * y2, x * z2, y * z2
-    wx, wy, wz = w * x2, w * y2, w * z2
-    return 1 - yy - zz, xy - wz, xz + wy, xy + wz, 1 - xx - zz, yz - wx, xz - wy, yz + wx, 1 - xx - yy

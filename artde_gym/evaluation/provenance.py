@@ -11,17 +11,8 @@ from pathlib import Path
 from typing import Any
 
 PACKAGES = (
-    "artde-gym",
-    "gymnasium",
-    "numpy",
-    "scipy",
-    "pandas",
-    "pybullet",
-    "mujoco",
-    "optuna",
-    "torch",
-    "stable-baselines3",
-)
+    "artde-gym", "gymnasium", "numpy", "scipy", "pandas", "pybullet", "mujoco", "optuna", "torch", "stable-baselines3",
+)  # fmt: skip
 
 
 def provenance() -> dict[str, Any]:

@@ -172,7 +172,7 @@ class BulletEngine:
         velocity, spin = bullet.getBaseVelocity(self._robot, physicsClientId=client)
         if not self._joints and not any(self._com):
             return State(_NO_JOINTS, _NO_JOINTS, center, quat, velocity, spin)
-        states = bullet.getJointStates(self._robot, self._joints, physicsClientId=client)
+        states = bullet.getJointStates(self._robot, self._joints, physicsClientId=client) if self._joints else ()
         n = len(states)
         joints = np.array([state[0] for state in states] + [state[1] for state in states])  # one array is faster
         x, y, z = arm = rotated(self._to_origin, quat)

@@ -291,6 +291,7 @@ def test_reset_options_replace_disturbances() -> None:
         ({"disturbances": {"payload": -1}}, ["payload.mass", "-1"]),
         ({"disturbances": {"payload": float("nan")}}, ["payload.mass", "nan"]),
         ({"disturbances": {"playload": 1}}, ["playload", "payload"]),
+        ({"disturbances": {"wind": 1.0}}, ["wind", "ojas", "friction"]),
         ({"disturbances": 3}, ["disturbances", "3"]),
     ],
 )
