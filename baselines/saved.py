@@ -53,7 +53,11 @@ def make_shipped(env: Any, *, policies: dict[str, str]) -> ResidualPolicy:
     spec = getattr(env, "spec", None)
     key = spec.id if spec is not None and spec.id in known else Plant.of(env).robot
     if key not in known:
-        raise UnknownNameError("environment of a trained policy", key if spec is None else spec.id, among(key, known))
+        raise UnknownNameError(
+            "environment of a trained policy",
+            key if spec is None else spec.id,
+            among(key, known) if known else "none: train one",
+        )
     return load(SHIPPED / known[key], env)
 
 
