@@ -217,6 +217,9 @@ def reproduce(
     episodes: Annotated[int, typer.Option(help="Seeded episodes of each controller in each scenario.")] = 10,
     scenario: Annotated[str | None, typer.Option(help="Names, comma-separated. Default: all of the robot.")] = None,
     controllers: Annotated[str | None, typer.Option(help="Names, comma-separated. Default: the robot's own.")] = None,
+    ablation: Annotated[
+        bool, typer.Option(help="Run TDE at ARTDE's mean gain too; on a folder that is there, only what is new.")
+    ] = False,
     seed: Annotated[int, typer.Option(help="Seed of the whole run.")] = 0,
     workers: Annotated[int | None, typer.Option(help="Processes. Default: all cores.")] = None,
     out: Annotated[
@@ -240,6 +243,7 @@ def reproduce(
                     out / one / name,
                     scenarios=chosen,
                     controllers=None if controllers is None else _names(controllers),
+                    ablation=ablation,
                     episodes=episodes,
                     seed=seed,
                     workers=workers or os.cpu_count() or 1,
@@ -257,6 +261,65 @@ def reproduce(
             both = confirm(verdicts)
             both.to_csv(out / f"claims-{name}.csv", index=False)
             print_claims(both, console)
+
+
+@app.command()
+def train(
+    env: Annotated[str, typer.Option(help="Environment id.")],
+    out: Annotated[Path, typer.Option(help="The run's folder; the same command continues an interrupted run.")],
+    base: Annotated[str, typer.Option(help="Controller under the residual; none: the agent gives the force.")] = "tde",
+    algo: Annotated[str, typer.Option(help="ppo, sac, or cma-es for the biped's linear balance law.")] = "ppo",
+    steps: Annotated[int, typer.Option(help="Decisions of the agent, all environments together.")] = 1_000_000,
+    seed: Annotated[int, typer.Option(help="Seed of everything.")] = 0,
+    workers: Annotated[int | None, typer.Option(help="Processes of environments. Default: all cores.")] = None,
+    channel: Annotated[str, typer.Option(help="What an action means. Default: the robot's; see the model cards.")] = "",
+    limit: Annotated[float, typer.Option(help="Largest residual. Default: the channel's.")] = 0.0,
+    gated: Annotated[bool, typer.Option(help="Fade the biped's residual in by tilt and velocity error.")] = True,
+    patience: Annotated[int, typer.Option(help="Held-out tests without a better score that end the run.")] = 20,
+    test_every: Annotated[int, typer.Option(help="Intervals (or generations) between two held-out tests.")] = 4,
+    engine: Annotated[str | None, typer.Option(help="Physics engine.")] = None,
+    env_kwargs: Annotated[str | None, typer.Option(help="JSON, arguments of the environment.")] = None,
+    options: Annotated[str | None, typer.Option(help="JSON, arguments of the algorithm.")] = None,
+) -> None:
+    """Train a residual on a controller; killed at any moment, the same command continues from its last checkpoint."""
+    from baselines.recipe import Recipe  # torch is heavy, and may not be installed
+    from baselines.run import Progress as TrainingProgress
+    from baselines.run import Training
+    from baselines.tasks import task
+
+    kwargs = _json("--env-kwargs", env_kwargs)
+    if engine is not None:
+        kwargs["engine"] = engine
+    training = Training(
+        env,
+        Recipe(task(env).robot, base, channel=channel, limit=limit, gated=gated),
+        algo=algo,
+        steps=steps,
+        seed=seed,
+        env_kwargs=kwargs,
+        options=_json("--options", options),
+        workers=1 if task(env).batched else workers or os.cpu_count() or 1,
+        patience=patience,
+        test_every=test_every,
+    )
+    try:
+        if algo == "cma-es":
+            from baselines.tune_balance import tune as go
+        else:
+            from baselines.train import train as go
+    except ModuleNotFoundError as error:
+        if error.name not in ("cmaes", "stable_baselines3", "torch", "tensorboard"):
+            raise
+        raise OptionError("algo", algo, "what is installed; pip install 'artde-gym[rl]'") from error
+    columns = (TextColumn("decisions"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, TextColumn("{task.description}")) as bar:
+        shown = bar.add_task("", total=steps)
+
+        def on_progress(news: TrainingProgress) -> None:
+            bar.update(shown, completed=news.steps, total=news.wanted, description=news.text)
+
+        policy = go(training, out, on_progress)
+    print(f"best policy: {policy}")
 
 
 @app.command("list")

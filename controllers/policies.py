@@ -67,12 +67,18 @@ class Policy(abc.ABC):
     def step(self, memory: Any, signals: Any, observation: Array) -> tuple[Array, Memory]:
         """One sample: force (..., n) before saturation, and the memory for the next one."""
 
+    @abc.abstractmethod
+    def accelerated(self, signals: Any, du: Array) -> Any:
+        """The signals with `du` (..., n) added to the reference acceleration, and so to the desired one of any law."""
+
     def predict(
         self,
         observation: ArrayLike,
         state: Memory | None = None,
         episode_start: ArrayLike | None = None,
         deterministic: bool = True,
+        *,
+        residual: ArrayLike | None = None,
     ) -> tuple[Array, Memory]:
         """The action for one observation (n_obs,) or for many (n_env, n_obs).
 
@@ -81,6 +87,7 @@ class Policy(abc.ABC):
             state: what the call before returned; None at the start.
             episode_start: one truth value an environment; where it is true, that environment's memory is cleared.
             deterministic: of the protocol; a law has no randomness.
+            residual: du (..., n), added to the law's desired acceleration; zero is the same as none, bit for bit.
 
         Raises:
             OptionError: if the observation's last axis is not as long as the environment's.
@@ -95,7 +102,9 @@ class Policy(abc.ABC):
         elif episode_start is not None:
             fresh = np.asarray(episode_start, dtype=np.bool_).reshape(given.shape[:-1])
             if fresh.any():
-                state = _choose(fresh, self.start(signals), state)
+                state = choose(fresh, self.start(signals), state)
+        if residual is not None:
+            signals = self.accelerated(signals, np.asarray(residual, dtype=given.dtype))
         force, state = self.step(state, signals, given)
         clipped = np.minimum(np.maximum(force, self._low), self._high)
         return clipped if clipped.dtype == force.dtype else clipped.astype(force.dtype), state
@@ -103,6 +112,11 @@ class Policy(abc.ABC):
     def diagnostics(self, state: Memory) -> dict[str, Array]:
         """What the memory tells of the law's inside, by name: sigma, s, beta, c, ..., as far as it has them."""
         return flatten(state)
+
+    def upcoming(self, state: Memory, signals: Any) -> dict[str, Array]:
+        """What the next step is about to see, by name, where the observation alone does not tell it."""
+        del state, signals
+        return {}
 
 
 class TrackingPolicy(Policy):
@@ -114,6 +128,9 @@ class TrackingPolicy(Policy):
 
     def read(self, observation: Array) -> Signals:
         return Signals(*[observation[part] for part in self._parts])
+
+    def accelerated(self, signals: Signals, du: Array) -> Signals:
+        return signals._replace(qdd_ref=signals.qdd_ref + du)
 
 
 class LawPolicy(TrackingPolicy):
@@ -157,10 +174,10 @@ def make_law(
     return EncoderPolicy(policy, plant, velocity_cutoff_hz)
 
 
-def _choose(mask: NDArray[np.bool_], fresh: Array | Memory, kept: Array | Memory) -> Any:
+def choose(mask: NDArray[np.bool_], fresh: Array | Memory, kept: Array | Memory) -> Any:
     """Nested tuples of arrays: `fresh` where the mask is true, `kept` elsewhere; the mask covers leading axes."""
     if isinstance(fresh, tuple):
-        merged = [_choose(mask, *pair) for pair in zip(fresh, kept, strict=True)]
+        merged = [choose(mask, *pair) for pair in zip(fresh, kept, strict=True)]
         kind: Any = type(fresh)
         return kind(*merged) if hasattr(kind, "_fields") else kind(merged)
     new, old = np.asarray(fresh), np.asarray(kept)

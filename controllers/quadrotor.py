@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from controllers.law_table import LAWS, Entry
-from controllers.laws.cascade import CascadeGains, CascadeMemory, Flight, cascade, cascade_start
+from controllers.laws.cascade import CascadeGains, CascadeMemory, Flight, attitude_errors, cascade, cascade_start
 from controllers.laws.tracking import Array, Memory
 from controllers.laws.vectors import Axes, joined
 from controllers.policies import Plant, Policy, flatten
@@ -57,6 +57,16 @@ class QuadrotorPolicy(Policy):
             thrust_applied=wrench[0],
             torque_applied=wrench[1:].transpose(last),
         )
+
+    def accelerated(self, signals: Flight, du: Array) -> Flight:
+        """Of the position, and of the attitude if `du` (..., 6) goes on with it (rad/s^2, body axes)."""
+        position = signals.acceleration_ref + du[..., :AXES]
+        return signals._replace(acceleration_ref=position, turning_ref=du[..., AXES:] if du.shape[-1] > AXES else None)
+
+    def upcoming(self, state: Any, signals: Flight) -> dict[str, Array]:
+        """`e_q` and `e_w`, the errors of the attitude loop (rad, rad/s, body axes)."""
+        e_q, e_w = attitude_errors(self.gains, state, signals)
+        return {"e_q": e_q, "e_w": e_w}
 
     def start(self, signals: Flight) -> Memory:
         return cascade_start(self._position, self._attitude, self.gains, signals, self._period)

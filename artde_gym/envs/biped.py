@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import operator
 from collections.abc import Callable, Mapping
@@ -136,6 +137,7 @@ The robot stands on both feet in the pattern's first pose, at rest, in balance w
 | `control_period` | 0.001 | whole multiples of 0.001 s up to 0.05 | time between two actions, L |
 | `actuator_inertia` | "rotor" | "rotor", "lumped", "none" | geared rotors, discs (3x faster), nothing |
 | `arms` | "fixed" | "fixed", "revolute" | all 20 joints with "revolute": arms held by motors |
+| `self_collision` | False | False, True | whether the feet stop each other, or overlap |
 | `speed` | 0.1 | 0 to 0.25 m/s | walking speed |
 | `step_duration` | 1.0 | 0.6 to 2 s | time of one step |
 | `duration` | 58.0 | from 0.1 s | length of the walk |
@@ -160,6 +162,7 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         control_period: time between two actions (s), a whole multiple of the physics' 0.001 s.
         actuator_inertia: see `artde_gym.robots.ojas`.
         arms: see `artde_gym.robots.ojas`.
+        self_collision: whether the feet stop each other; a walk as planned never lets them touch.
         speed: see `artde_gym.references.walking`, also for `step_duration` and `duration`.
         observe_ground_force: whether the observation ends with the ground's force on each foot.
         engine: physics engine.
@@ -184,6 +187,7 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         control_period: float = 0.001,
         actuator_inertia: ActuatorInertia = "rotor",
         arms: Literal["fixed", "revolute"] = "fixed",
+        self_collision: bool = False,
         speed: float = 0.1,
         step_duration: float = 1.0,
         duration: float = 58.0,
@@ -195,7 +199,7 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
             raise OptionError("render_mode", render_mode, "None, 'rgb_array'")
         self.render_mode = render_mode
         self.nominal_robot = ojas(actuator_inertia)
-        model = ojas(actuator_inertia, arms=arms)
+        model = dataclasses.replace(ojas(actuator_inertia, arms=arms), feet_collide=self_collision)
         self._sites = [name for name, _, _ in model.sites]
         self._disturbances = self._parse(self.default_disturbances if disturbances is None else disturbances)
         self._substeps = steps_per_period(control_period, TIME_STEP)

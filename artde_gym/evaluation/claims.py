@@ -39,12 +39,14 @@ class Claim:
         text: the statement.
         thesis: the thesis' own number or observation; "ours" for a question that we add.
         judge: episodes -> verdict.
+        ablation: whether it takes the ablation of `artde_gym.evaluation.reproduce`.
     """
 
     scenario: str
     text: str
     thesis: str
     judge: Callable[[Result], Verdict]
+    ablation: bool = False
 
 
 def improves(
@@ -197,6 +199,7 @@ CLAIMS: tuple[Claim, ...] = (
             "adaptation adds to the equivalent extra stiffness (ARTDE against tde+kd)",
             "ours",
             adapts(name, "tde+kd", "rmse_deg"),
+            ablation=True,
         )
         for name in ("S1", "S2", "S3", "S1-L4", "S2-L4", "S3-L4")
     ),
@@ -247,7 +250,13 @@ CLAIMS: tuple[Claim, ...] = (
         for rival in ("atde", "asmc")
     ),
     *(
-        Claim(name, f"adaptation adds to {what} in wind (ARTDE against {rival})", "ours", adapts(name, rival, "rmse_m"))
+        Claim(
+            name,
+            f"adaptation adds to {what} in wind (ARTDE against {rival})",
+            "ours",
+            adapts(name, rival, "rmse_m"),
+            ablation=rival == "tde+kd",
+        )
         for name in ("Q1", "Q1-gale")
         for what, rival in (("plain TDE", "tde"), ("the equivalent extra stiffness", "tde+kd"))
     ),

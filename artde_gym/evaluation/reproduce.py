@@ -1,8 +1,8 @@
 """The thesis' scenarios, run and judged claim by claim.
 
-Beside the thesis' controllers and their rivals runs an ablation: plain TDE at constant extra stiffness and damping
-(`tde+kd`), as much of it as ARTDE's robust gain c came to *in the same scenario*, on average over its episodes. What
-ARTDE is better than that, it owes to adaptation.
+Beside the thesis' controllers and their rivals, an ablation can be run: plain TDE at constant extra stiffness and
+damping (`tde+kd`), as much of it as ARTDE's robust gain c came to *in the same scenario*, on average over its episodes.
+What ARTDE is better than that, it owes to adaptation.
 
     <out>/                       the folder of `evaluate`, all controllers but the ablation
     <out>/ablation/<scenario>/   one of the ablation in each scenario, at a gain of its own
@@ -42,11 +42,11 @@ class Selection:
 ROBOTS: dict[str, Selection] = {
     "biped": Selection(
         ("S1", "S2", "S3", "S1-L4", "S2-L4", "S3-L4", "S1-GRF"),
-        ("tde", "atde", ADAPTIVE, ABLATION),
+        ("tde", "atde", ADAPTIVE),
     ),
     "quadrotor": Selection(
         ("Q1", "Q1-calm", "Q1-gale"),
-        ("tde", "atde", ADAPTIVE, ABLATION, "asmc", "pid", "geometric", "indi"),
+        ("tde", "atde", ADAPTIVE, "asmc", "pid", "geometric", "indi"),
     ),
 }
 """What is run where nothing else is asked for."""
@@ -79,6 +79,7 @@ def reproduce(
     *,
     scenarios: Sequence[str] | None = None,
     controllers: Sequence[str] | None = None,
+    ablation: bool = False,
     episodes: int = 10,
     seed: int = 0,
     workers: int = 1,
@@ -91,7 +92,8 @@ def reproduce(
         robot: "biped" or "quadrotor".
         out: folder to store everything in; the same call continues an interrupted one.
         scenarios: of this robot, in place of `ROBOTS`' ones.
-        controllers: likewise; the ablation needs "artde" beside it.
+        controllers: likewise, without the ablation.
+        ablation: whether to run it too; "artde" must be among the controllers then.
         episodes: seeded episodes of each controller in each scenario.
         seed: of everything.
         workers: processes; the results do not depend on it.
@@ -106,8 +108,10 @@ def reproduce(
     if not chosen:
         raise OptionError("scenarios", scenarios, f"at least one of the {robot}'s")
     names = list(ROBOTS[robot].controllers if controllers is None else controllers)
-    if ABLATION in names and ADAPTIVE not in names:
-        raise OptionError("controllers", names, f"{ADAPTIVE!r} beside {ABLATION!r}, whose gain is taken from it")
+    if ABLATION in names:
+        raise OptionError("controllers", ABLATION, "other names; it is run by ablation=True, at gains of its own")
+    if ablation and ADAPTIVE not in names:
+        raise OptionError("controllers", names, f"{ADAPTIVE!r} among them, from which the ablation takes its gain")
     folder = Path(out)
 
     def run(what: str, controllers: list[str], scenario: Sequence[str], where: Path, gains: Any = None) -> Result:
@@ -128,15 +132,16 @@ def reproduce(
             on_progress=report,
         )
 
-    result = run("episodes", [name for name in names if name != ABLATION], chosen, folder)
-    if ABLATION in names:
+    result = run("episodes", names, chosen, folder)
+    if ablation:
         for name in chosen:
             if not result.complete:
                 break
             gains = {ABLATION: equivalent_gains(result, name)}
             part = run(f"ablation in {name}", [ABLATION], [name], folder / "ablation" / name, gains)
             result = Result(pd.concat([result.episodes, part.episodes]), folder, part.complete)
-    verdicts = judge(result, [claim for claim in CLAIMS if claim.scenario in result.scenarios])
+    made = [claim for claim in CLAIMS if claim.scenario in result.scenarios and (ablation or not claim.ablation)]
+    verdicts = judge(result, made)
     text = verdicts.to_csv(index=False, lineterminator="\n")
     write_atomically(folder / "claims.csv", lambda file: file.write(text.encode()))
     return Reproduction(result, verdicts)

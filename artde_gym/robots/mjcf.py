@@ -63,6 +63,9 @@ def mjcf(spec: RobotSpec) -> str:
     for link in spec.links:
         for index in range(len(link.collisions)):
             ET.SubElement(contact, "pair", geom1=GROUND, geom2=_collision(link, index))
+    if spec.feet_collide:
+        left, right = (_collision(spec.by_name[foot], 0) for foot in spec.feet)
+        ET.SubElement(contact, "pair", geom1=left, geom2=right)
     equality = ET.SubElement(root, "equality")
     for link in spec.joints:
         if link.name not in spec.actuated:

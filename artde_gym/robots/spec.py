@@ -89,6 +89,7 @@ class RobotSpec:
         gears: couplings between rotor links and driven links.
         feet: links that carry the robot, left then right.
         sites: named points to push at or to load, as (link, position in the link frame).
+        feet_collide: whether the feet stop each other, or pass through each other.
     """
 
     name: str
@@ -100,6 +101,7 @@ class RobotSpec:
     gear_ratio: float = 10.0
     gears: tuple[Gear, ...] = ()
     sites: tuple[tuple[str, str, Vector], ...] = ()
+    feet_collide: bool = False
 
     @functools.cached_property
     def by_name(self) -> dict[str, Link]:

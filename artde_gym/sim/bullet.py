@@ -105,7 +105,10 @@ class BulletEngine:
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / f"{self.spec.name}.urdf"
             file.write_text(urdf(self.spec), encoding="utf-8")
-            robot = bullet.loadURDF(str(file), flags=bullet.URDF_USE_INERTIA_FROM_FILE, **client)
+            flags = bullet.URDF_USE_INERTIA_FROM_FILE
+            if self.spec.feet_collide:
+                flags |= bullet.URDF_USE_SELF_COLLISION  # only feet have a collision shape
+            robot = bullet.loadURDF(str(file), flags=flags, **client)
         count = bullet.getNumJoints(robot, **client)
         self._links = {bullet.getJointInfo(robot, i, **client)[12].decode(): i for i in range(count)}
         self._links[self.spec.base.name] = -1

@@ -11,8 +11,6 @@ from artde_gym.arrays import Array
 from artde_gym.robots.spec import RobotSpec, Vector
 from artde_gym.sim.rotation import Quaternion
 
-PAYLOAD_RADIUS = 0.08  # m, of the homogeneous ball
-
 
 class State(NamedTuple):
     """One robot at one instant; positions and velocities are those of the base link's origin, in world axes.
@@ -44,7 +42,9 @@ PAYLOAD_COLOUR = (0.85, 0.45, 0.1, 1.0)
 
 
 class Engine(Protocol):
-    """One robot on flat, level ground, which only the spec's collision shapes touch; its parts pass through each other.
+    """One robot on flat, level ground, which only the spec's collision shapes touch.
+
+    Its parts pass through each other, unless the spec says that its feet do not.
 
     Joints that the spec does not actuate are held at zero. Gravity and masses stay as they were set, whatever is placed
     or restored afterwards; they start at 9.81 m/s^2 downward and at the spec's. Friction has no default: set it.

@@ -34,7 +34,7 @@ import numpy as np
 from controllers.laws.attitude import attitude_error, desired_axes, desired_rates, heading
 from controllers.laws.errors import GainError
 from controllers.laws.second_order import FilterMemory, second_order
-from controllers.laws.tracking import Array, Law, Signals, check_positive_number, is_finite, times
+from controllers.laws.tracking import Array, Law, Signals, check_positive_number, errors, is_finite, times
 from controllers.laws.vectors import (
     Axes,
     Vector,
@@ -61,6 +61,7 @@ class Flight(NamedTuple):
         yaw_ref, yaw_rate_ref: (...) in rad and rad/s.
         thrust_applied: u1 (...) (N), mean over the period before.
         torque_applied: [u2, u3, u4] (..., 3) (Nm), likewise.
+        turning_ref: added to the attitude's reference acceleration (..., 3) (rad/s^2), body axes; None for nothing.
     """
 
     position: Array
@@ -75,6 +76,7 @@ class Flight(NamedTuple):
     yaw_rate_ref: Array
     thrust_applied: Array
     torque_applied: Array
+    turning_ref: Array | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -176,6 +178,12 @@ def cascade(
     return wrench, CascadeMemory(position_memory, attitude_memory, command, force, flight.axes, axes_ref)
 
 
+def attitude_errors(gains: CascadeGains, memory: CascadeMemory, flight: Flight) -> tuple[Array, Array]:
+    """e_q and e_w (..., 3) that the attitude law is about to see, for the command "filtered" exactly."""
+    axes_ref, rates_ref = _attitude_command(memory.command, flight, 0.0)
+    return errors(_attitude_signals(gains, flight, axes_ref, rates_ref, scaled(0.0, rates_ref)))
+
+
 def _position_signals(flight: Flight, applied: Array) -> Signals:
     return Signals(
         flight.position,
@@ -228,7 +236,10 @@ def _attitude_signals(
         # e_q. = w - R_d^T R w_d
         carried = plus(rates, minus(rates, to_body(axes_ref, to_world(flight.axes, rates_ref))))
     q = joined(scaled(-1.0, e))
-    return Signals(q, flight.rates, np.zeros_like(q), joined(carried), joined(feedforward), flight.torque_applied)
+    acceleration = joined(feedforward)
+    if flight.turning_ref is not None:
+        acceleration = acceleration + flight.turning_ref
+    return Signals(q, flight.rates, np.zeros_like(q), joined(carried), acceleration, flight.torque_applied)
 
 
 def _within_reach(gains: CascadeGains, force: Vector) -> Vector:

@@ -312,7 +312,6 @@ def test_command_prints_ours_beside_the_thesis(tmp_path: Path) -> None:
         "3.264",
         "-36.5",
         "no fall",
-        "after disturbances",
     ):
         assert word in outcome.output
     listing = CliRunner().invoke(app, ["list"]).output
@@ -340,7 +339,11 @@ def test_the_ablation_is_as_stiff_as_artde_was_in_the_same_scenario(
 ) -> None:
     for name in ("S1", "S2"):
         monkeypatch.setitem(SCENARIOS, name, dataclasses.replace(SCENARIOS[name], kwargs=SHORT))
-    found = reproduce("biped", tmp_path, scenarios=["S1", "S2"], episodes=2)
+    without = reproduce("biped", tmp_path, scenarios=["S1", "S2"], episodes=2)
+    assert "tde+kd" not in without.result.controllers
+    assert not without.claims["claim"].str.contains("tde+kd", regex=False).any()
+    found = reproduce("biped", tmp_path, scenarios=["S1", "S2"], episodes=2, ablation=True)  # adds to what is there
+    assert found.claims["claim"].str.contains("tde+kd", regex=False).sum() == 2
     gains = {}
     for name in ("S1", "S2"):
         mean = found.result.values(name, "artde", "robust_gain_mean").mean()
@@ -352,9 +355,21 @@ def test_the_ablation_is_as_stiff_as_artde_was_in_the_same_scenario(
             found.result.values(name, "tde+kd", "rmse_deg").tobytes()
         )
     assert gains["S1"] != gains["S2"]
-    with pytest.raises(OptionError, match="beside"):
+    with pytest.raises(OptionError, match="takes its gain"):
+        reproduce("biped", tmp_path / "other", scenarios=["S1"], controllers=["tde"], ablation=True)
+    with pytest.raises(OptionError, match="ablation=True"):
         reproduce("biped", tmp_path / "other", scenarios=["S1"], controllers=["tde", "tde+kd"])
     assert not (tmp_path / "other").exists()
+
+
+def test_one_command_evaluates_both_robots(tmp_path: Path) -> None:
+    arguments = ["evaluate", "--scenario", "S1,Q1", "--controllers", "tde,artde", "--episodes", "1", "--workers", "1"]
+    arguments += ["--env-kwargs", json.dumps({"duration": 1.4}), "--out", str(tmp_path / "run")]
+    outcome = CliRunner().invoke(app, arguments)
+    assert outcome.exit_code == 0, outcome.output
+    for word in ("Table 2.1", "RMS error (deg)", "Table 3.1", "RMS error (m)", "peak (deg)"):
+        assert word in outcome.output
+    assert "peak (m)" not in outcome.output  # the flight ends before the drop
 
 
 def test_a_recovery_that_never_came_is_counted() -> None:

@@ -1,0 +1,58 @@
+"""How an agent is coupled to a robot: what it sees, and how its action becomes an acceleration."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar, NamedTuple, Protocol
+
+import numpy as np
+
+from artde_gym.layout import Layout
+from controllers.laws.tracking import Array
+
+
+class Inside(NamedTuple):
+    """What a base controller knows: s (..., n), sigma (..., n) and c (...); zeros where it knows no such thing."""
+
+    s: Array
+    sigma: Array
+    c: Array
+
+
+class Coupling(Protocol):
+    """One robot's. All arrays may have leading axes, one entry an environment; memory is a named tuple of arrays."""
+
+    features: Layout
+    actions: tuple[str, ...]
+    reward_scales: ClassVar[Mapping[str, float]]
+
+    def start(self, observation: Array) -> Any:
+        """Memory at the start of an episode."""
+        ...
+
+    def observe(self, observation: Array, inside: Mapping[str, Array], memory: Any) -> tuple[Array, Any]:
+        """What the agent sees (..., n_features), and memory.
+
+        Args:
+            observation: of the environment.
+            inside: the base's diagnostics after the sample before.
+            memory: of the call before.
+        """
+        ...
+
+    def decide(self, memory: Any, action: Array) -> Any:
+        """Memory with an action (..., n_actions) in [-1, 1] that acts until the next one."""
+        ...
+
+    def advance(self, memory: Any) -> tuple[Array, Any]:
+        """The acceleration du (..., n) for one control period, and memory."""
+        ...
+
+    def reward_terms(self, observation: Array, memory: Any, fell: Any) -> dict[str, Array]:
+        """Terms of the reward of one decision by name, at its end, observed already; weighted by `reward_scales`."""
+        ...
+
+
+def total(scales: Mapping[str, float], terms: Mapping[str, Array]) -> Array:
+    """The sum of scales times terms."""
+    return np.asarray(sum(scale * terms[name] for name, scale in scales.items()))

@@ -1,0 +1,263 @@
+"""An agent on the biped: it shifts feet, body and ankles, and sees and acts as if it always stood on the left leg.
+
+While the right leg carries the robot, observation and action go through a mirror, so that one network serves both.
+
+Channel "synergies": the action moves, within `RANGES`, the swinging foot, the body over both feet, the ankles and the
+lean. Through the inverse kinematics of the legs this is an offset r of the reference joints, which a critically damped
+filter of `FILTER_RATE` turns into a smooth one; an offset of the reference is an acceleration in the slot of du,
+
+    du = r.. + Kd r. + Kp r,    r.. = (r._k+1 - r._k) / L
+
+The offset of the swinging foot is latched when it is planned to land, and lasts until that foot swings again: a foot on
+the ground cannot be moved, only the body would be. Channel "joints": du = limit x action, held.
+
+With `gated`, ranges are multiplied by a gate in [0, 1] that opens by the base's tilt or by its velocity error and
+closes slowly: nominal walking is the base controller's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from artde_gym.layout import Field, Layout
+from baselines.legs import JOINTS, LEG, Mirror, ankle, level, mirrored_joints, moved
+from baselines.recipe import NO_BASE, Recipe
+from controllers.laws.second_order import FilterMemory, second_order
+from controllers.laws.tracking import Array, sliding_variable
+from controllers.policies import Plant
+
+RANGES: dict[str, float] = {
+    "swing_x": 0.10,  # m, of the swinging foot, forward
+    "swing_out": 0.06,  # m, away from the standing leg
+    "swing_z": 0.03,  # m, up
+    "body_x": 0.04,  # m, of the body over both feet, forward
+    "body_y": 0.03,  # m, to the left
+    "stance_pitch": 0.2,  # rad, of the standing leg's ankle
+    "stance_roll": 0.15,  # rad
+    "swing_pitch": 0.15,  # rad, of the swinging leg's ankle
+    "swing_roll": 0.15,  # rad
+    "lean_pitch": 0.15,  # rad, of both hips
+    "lean_roll": 0.1,  # rad
+}
+"""What a component of the action is, in the mirror, and its largest size."""
+FILTER_RATE = 25.0  # rad/s
+K_P, K_D = 25.0, 10.0  # of the error dynamics that the thesis asks for
+OPENS_TILT = (0.03, 0.08)  # rad, where the gate begins to open, and where it is open; a walk without pushes: 0.016
+OPENS_SPEED = (0.08, 0.16)  # m/s, likewise; a walk without pushes: 0.055
+CLOSING = 0.5  # s, time constant of the closing gate
+DIFFERENCE = 1e-4  # s, of the reference velocity's difference quotient
+
+
+class OjasMemory(NamedTuple):
+    """What lasts.
+
+    Attributes:
+        right: whether the right leg carries (...).
+        single: whether one leg alone is planned to (...).
+        gate: (...).
+        ankles: of the reference, standing and swinging leg, in the mirror (..., 2, 3) (m).
+        offsets: of feet on the ground or in the air: standing x, y, swinging x, y, in the mirror (..., 4) (m).
+        action: in the mirror (..., n).
+        target: of the joints, not in the mirror (..., 12): an offset (rad), or du itself with channel "joints".
+        filter: of it.
+    """
+
+    right: NDArray[np.bool_]
+    single: NDArray[np.bool_]
+    gate: Array
+    ankles: Array
+    offsets: Array
+    action: Array
+    target: Array
+    filter: FilterMemory
+
+
+class OjasCoupling:
+    """The coupling at the top.
+
+    Args:
+        plant: of the environment.
+        recipe: of the residual.
+        gains: of the base, for s; None without one.
+    """
+
+    reward_scales: ClassVar[Mapping[str, float]] = {
+        "alive": 1.0,
+        "upright": 0.5,
+        "velocity": 0.5,
+        "tracking": 0.5,
+        "residual": -0.01,
+        "fall": -20.0,
+    }
+
+    def __init__(self, plant: Plant, recipe: Recipe, gains: Any) -> None:
+        torque = recipe.base == NO_BASE
+        self._synergies = recipe.channel == "synergies" and not torque
+        self._limit = float(plant.action.box().high[0]) if torque else recipe.limit
+        self._gated = recipe.gated and not torque
+        self._period = plant.control_period
+        self._hold = recipe.hold
+        self._gains = (gains.k_p, gains.k_d) if hasattr(gains, "k_p") else None
+        self._mirror = Mirror(plant.observation)
+        self._at = plant.observation.slices
+        self.actions: tuple[str, ...] = tuple(RANGES) if self._synergies else tuple(f"q{i + 1}" for i in range(JOINTS))
+        self.features = Layout(
+            (
+                Field("tilt", 2, "rad", -1.0, 1.0, "roll and pitch of the base"),
+                Field("angular_velocity", 3, "rad/s", -20.0, 20.0, "of the base"),
+                Field("velocity_error", 3, "m/s", -5.0, 5.0, "of the base, actual minus reference"),
+                Field("displacement", 3, "m", -1.0, 1.0, "of the base over the standing foot, likewise"),
+                Field("contact", 2, "1", 0.0, 1.0, "of the standing and the swinging foot"),
+                Field("load_ref", 1, "1", 0.0, 1.0, "share of the weight meant for the standing foot"),
+                Field("progress", 1, "1", 0.0, 1.0, "within the step"),
+                Field("offsets", 4, "m", -0.2, 0.2, "x, y of the standing and the swinging foot that are latched"),
+                Field("gate", 1, "1", 0.0, 1.0, "of the residual"),
+                Field("e", JOINTS, "rad", -3.2, 3.2, "q_ref - q"),
+                Field("ed", JOINTS, "rad/s", -50.0, 50.0, "qd_ref - qd"),
+                Field("s", JOINTS, "rad", -5.0, 5.0, "the base's sliding variable"),
+                Field("sigma", JOINTS, "rad/s^2", -1e4, 1e4, "TDE error, a sample ago"),
+                Field("c", 1, "rad/s^2", 0.0, 1e3, "gain of the robust term"),
+                Field("action", len(self.actions), "1", -1.0, 1.0, "of the agent, a decision ago"),
+            )
+        )
+
+    def start(self, observation: Array) -> OjasMemory:
+        lead, kind = observation.shape[:-1], observation.dtype
+        no, nothing = np.zeros(lead, np.bool_), np.zeros((*lead, JOINTS), kind)
+        return OjasMemory(
+            no,
+            no,
+            np.zeros(lead, kind),
+            np.zeros((*lead, 2, 3), kind),
+            np.zeros((*lead, 4), kind),
+            np.zeros((*lead, len(self.actions)), kind),
+            nothing,
+            FilterMemory(nothing, nothing),
+        )
+
+    def observe(self, observation: Array, inside: Mapping[str, Array], memory: OjasMemory) -> tuple[Array, OjasMemory]:
+        at = self._at
+        right = observation[..., at["load_left_ref"].start] < 0.5
+        seen = np.where(right[..., None], self._mirror(observation), observation)
+        q, q_ref, qd_ref = seen[..., at["q"]], seen[..., at["q_ref"]], seen[..., at["qd_ref"]]
+        e, ed = q_ref - q, qd_ref - seen[..., at["qd"]]
+        ahead = DIFFERENCE * qd_ref[..., :LEG]
+        standing = q_ref[..., :LEG]
+        legs = np.stack([standing, q_ref[..., LEG:], q[..., :LEG], standing + ahead, standing - ahead], axis=-2)
+        ankles = ankle(legs)
+        tilt = seen[..., at["tilt"]]
+        velocity_ref = (ankles[..., 4, :] - ankles[..., 3, :]) / (2 * DIFFERENCE)
+        velocity_error = seen[..., at["base_velocity"]] - velocity_ref
+        displacement = ankles[..., 0, :] - level(tilt, ankles[..., 2, :])
+        gate = self._gate(tilt, velocity_error, memory.gate)
+        load = seen[..., at["load_left_ref"]]
+        changed = right != memory.right
+        offsets, action = memory.offsets, memory.action
+        if changed.any():
+            offsets = np.where(changed[..., None], _swapped(offsets), offsets)
+        s = np.zeros_like(e) if self._gains is None else sliding_variable(e, ed, *self._gains)
+        sigma = inside.get("sigma")
+        if sigma is None:
+            sigma = np.zeros_like(e)
+        elif right.any():
+            sigma = np.where(right[..., None], mirrored_joints(sigma), sigma)
+        c = inside.get("c")
+        parts = [
+            tilt,
+            seen[..., at["base_angular_velocity"]],
+            velocity_error,
+            displacement,
+            seen[..., at["contact"]],
+            load,
+            np.remainder(2.0 * seen[..., at["phase"]], 1.0),
+            offsets,
+            gate[..., None],
+            e,
+            ed,
+            s,
+            sigma,
+            np.zeros_like(load) if c is None else c[..., None],
+            action,
+        ]
+        kept = memory._replace(
+            right=right, single=load[..., 0] > _SINGLE, gate=gate, ankles=ankles[..., :2, :], offsets=offsets
+        )
+        return np.concatenate(parts, axis=-1, dtype=observation.dtype), kept
+
+    def decide(self, memory: OjasMemory, action: Array) -> OjasMemory:
+        action = np.minimum(np.maximum(action, -1.0), 1.0).astype(memory.action.dtype)
+        scaled = memory.gate[..., None] * action
+        if not self._synergies:
+            target = self._limit * scaled
+            return memory._replace(action=action, target=_unmirrored(memory.right, target))
+        wanted = scaled * _SIZES
+        offsets = memory.offsets
+        in_air = np.stack([wanted[..., 0], -wanted[..., 1]], axis=-1)
+        flying = np.where(memory.single[..., None], in_air, offsets[..., 2:])
+        offsets = np.concatenate([offsets[..., :2], flying], axis=-1)
+        feet = np.zeros((*memory.ankles.shape[:-1], 3), action.dtype)
+        feet[..., 0, :2], feet[..., 1, :2] = offsets[..., :2], offsets[..., 2:]
+        feet[..., :2] -= wanted[..., None, 3:5]
+        feet[..., 1, 2] = wanted[..., 2]
+        joints = moved(memory.ankles, feet)
+        joints[..., 4:] += wanted[..., 5:9].reshape(*wanted.shape[:-1], 2, 2)
+        joints[..., 2] += wanted[..., None, 9]
+        joints[..., 1] += wanted[..., None, 10]
+        target = joints.reshape(*wanted.shape[:-1], JOINTS)
+        return memory._replace(offsets=offsets, action=action, target=_unmirrored(memory.right, target))
+
+    def advance(self, memory: OjasMemory) -> tuple[Array, OjasMemory]:
+        if not self._synergies:
+            return memory.target, memory
+        before = memory.filter
+        after = second_order(before, memory.target, FILTER_RATE, 1.0, self._period)
+        du = (after.rate - before.rate) / self._period + K_D * before.rate + K_P * before.value
+        return np.minimum(np.maximum(du, -self._limit), self._limit), memory._replace(filter=after)
+
+    def reward_terms(self, observation: Array, memory: OjasMemory, fell: Any) -> dict[str, Array]:
+        at, action = self._at, memory.action
+        tilt, velocity = observation[..., at["tilt"]], observation[..., at["base_velocity"]]
+        e = observation[..., at["q_ref"]] - observation[..., at["q"]]
+        too_fast = velocity[..., :2] - np.array([0.1, 0.0])
+        return {
+            "alive": np.ones(observation.shape[:-1]),
+            "upright": np.exp(-np.vecdot(tilt, tilt) / 0.02),
+            "velocity": np.exp(-np.vecdot(too_fast, too_fast) / 0.1),
+            "tracking": np.exp(-np.vecdot(e, e) / 0.02),
+            "residual": np.vecdot(action, action),
+            "fall": np.asarray(fell, dtype=np.float64),
+        }
+
+    def _gate(self, tilt: Array, velocity_error: Array, before: Array) -> Array:
+        if not self._gated:
+            return np.ones_like(before)
+        sideways = velocity_error[..., :2]
+        by_tilt = _smooth(np.sqrt(np.vecdot(tilt, tilt)), *OPENS_TILT)
+        by_speed = _smooth(np.sqrt(np.vecdot(sideways, sideways)), *OPENS_SPEED)
+        kept = before * np.exp(-self._hold / CLOSING)
+        kept = np.where(kept > _CLOSED, kept, 0.0)
+        return np.maximum(np.maximum(by_tilt, by_speed), kept).astype(before.dtype, copy=False)
+
+
+_SIZES = np.array(list(RANGES.values()))
+_SINGLE = 1.0 - 1e-6
+_CLOSED = 0.01
+
+
+def _smooth(value: Array, low: float, high: float) -> Array:
+    """From 0 at `low` to 1 at `high`, with zero slope at both."""
+    u = np.minimum(np.maximum((value - low) / (high - low), 0.0), 1.0)
+    return u * u * (3.0 - 2.0 * u)
+
+
+def _swapped(offsets: Array) -> Array:
+    """Offsets in the other mirror image: the legs change their roles, y its sign."""
+    return offsets[..., [2, 3, 0, 1]] * np.array([1.0, -1.0, 1.0, -1.0])
+
+
+def _unmirrored(right: NDArray[np.bool_], joints: Array) -> Array:
+    return np.where(right[..., None], mirrored_joints(joints), joints) if right.any() else joints

@@ -1,0 +1,136 @@
+"""Saved policies: a folder with `policy.json`, what it is, and `weights.npz`, plain arrays. Nothing is executed.
+
+`policy.json` names the format's version, the recipe of the residual, fields and hash of what the agent sees and does,
+the network's shape, and the hash of the weights; all of it is checked on loading.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import io
+import itertools
+import json
+import os
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import artde_gym
+from artde_gym.errors import OptionError
+from artde_gym.layout import Layout
+from baselines.errors import PolicyFileError
+from baselines.network import Network
+from baselines.recipe import Recipe
+
+VERSION = 1
+DESCRIPTION, WEIGHTS = "policy.json", "weights.npz"
+
+
+class Saved(NamedTuple):
+    """A policy as it lies in a folder."""
+
+    name: str
+    recipe: Recipe
+    network: Network
+    features: str
+    actions: tuple[str, ...]
+    control_period: float
+    nominal: str
+    about: dict[str, Any]
+
+
+def layout_hash(layout: Layout) -> str:
+    """Of names, sizes and units of all fields, in order."""
+    text = json.dumps([[field.name, field.size, field.unit] for field in layout.fields])
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def save(folder: Path, saved: Saved) -> None:
+    """Write a policy; each of the two files is replaced at once, the description last."""
+    network = saved.network
+    arrays = {"mean": network.mean, "variance": network.variance}
+    for i, (weight, bias) in enumerate(network.layers):
+        arrays |= {f"weight_{i}": weight, f"bias_{i}": bias}
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)  # pyright: ignore[reportArgumentType]  # its stub mixes up arrays and flags
+    description = {
+        "version": VERSION,
+        "artde_gym": artde_gym.__version__,
+        "name": saved.name,
+        "recipe": {**dataclasses.asdict(saved.recipe), "gains": dict(saved.recipe.gains)},
+        "control_period": saved.control_period,
+        "nominal_robot": saved.nominal,
+        "features_sha256": saved.features,
+        "actions": list(saved.actions),
+        "network": {
+            "sizes": [len(network.mean), *(len(bias) for _, bias in network.layers)],
+            "activation": "tanh",
+            "squashed": network.squashed,
+        },
+        "weights_sha256": hashlib.sha256(buffer.getvalue()).hexdigest(),
+        "about": saved.about,
+    }
+    folder.mkdir(parents=True, exist_ok=True)
+    _replace(folder / WEIGHTS, buffer.getvalue())
+    _replace(folder / DESCRIPTION, (json.dumps(description, indent=2) + "\n").encode())
+
+
+def read(folder: Path) -> Saved:
+    """Read a policy.
+
+    Raises:
+        PolicyFileError: if it is missing, damaged, of another version, or not of this form.
+    """
+    try:
+        description = json.loads((folder / DESCRIPTION).read_text(encoding="utf-8"))
+        content = (folder / WEIGHTS).read_bytes()
+    except (OSError, ValueError) as error:
+        raise PolicyFileError("policy", str(folder), f"a folder with {DESCRIPTION} and {WEIGHTS} ({error})") from error
+    if not isinstance(description, Mapping) or description.get("version") != VERSION:
+        found = description.get("version") if isinstance(description, Mapping) else None
+        raise PolicyFileError(f"version of {folder / DESCRIPTION}", found, f"{VERSION}, what this release reads")
+    if hashlib.sha256(content).hexdigest() != description.get("weights_sha256"):
+        raise PolicyFileError("weights", str(folder / WEIGHTS), f"the file that {DESCRIPTION} was written with")
+    try:
+        recipe = Recipe(**description["recipe"])
+        sizes = description["network"]["sizes"]
+        network = _network(content, sizes, bool(description["network"]["squashed"]))
+        return Saved(
+            str(description["name"]),
+            recipe,
+            network,
+            str(description["features_sha256"]),
+            tuple(description["actions"]),
+            float(description["control_period"]),
+            str(description["nominal_robot"]),
+            dict(description["about"]),
+        )
+    except (KeyError, TypeError, ValueError, OSError, EOFError, zipfile.BadZipFile, OptionError) as error:
+        if isinstance(error, PolicyFileError):
+            raise
+        raise PolicyFileError("policy", str(folder), f"what `baselines` writes ({error!r})") from error
+
+
+def _network(content: bytes, sizes: list[int], squashed: bool) -> Network:
+    def checked(name: str, shape: tuple[int, ...]) -> Any:
+        array = arrays[name]
+        if array.dtype != np.float32 or array.shape != shape or not np.isfinite(array).all():
+            raise PolicyFileError(f"array {name!r}", f"{array.dtype} {array.shape}", f"finite float32 {shape}")
+        return array
+
+    with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+        layers = tuple(
+            (checked(f"weight_{i}", (before, after)), checked(f"bias_{i}", (after,)))
+            for i, (before, after) in enumerate(itertools.pairwise(sizes))
+        )
+        return Network(checked("mean", (sizes[0],)), checked("variance", (sizes[0],)), layers, squashed)
+
+
+def _replace(file: Path, content: bytes) -> None:
+    part = file.with_name(f".{file.name}.part")
+    part.write_bytes(content)
+    os.replace(part, file)

@@ -1,0 +1,148 @@
+"""An agent on the quadrotor: it adds to the accelerations that the two loops of a cascade ask for.
+
+Channel "attitude": du_q = TURNING limit x [roll, pitch, yaw] (rad/s^2, body axes) in the attitude loop, which at the
+thesis' gains is the slow one. Channel "position": du_p = limit x [x, y, z] (m/s^2, world axes) in the position loop,
+which alone has little to gain. Channel "cascade": both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from artde_gym.layout import Field, Layout
+from baselines.recipe import NO_BASE, Recipe
+from controllers.laws.tracking import Array, sliding_variable
+from controllers.policies import Plant
+
+AXES = ("x", "y", "z")
+TURNS = ("roll", "pitch", "yaw")
+TURNING = 5.0  # limit of the attitude's du over the position's (rad/m)
+PASSED_ON = (
+    "rot_body_to_world",
+    "body_rates",
+    "acceleration_ref",
+    "jerk_ref",
+    "wrench_applied",
+    "rotor_thrust",
+)
+"""Fields of the observation that the agent sees as they are."""
+SCALES = {"position": 0.02, "velocity": 0.05, "attitude": 0.01, "turning": 0.1}  # m, m/s, rad, rad/s
+"""Errors that cost a unit of reward. What answers soonest to an action weighs most: most of the position's error is the
+wind's doing, and in that noise an action of 15 ms is not to be found."""
+WORST = 10.0  # units
+
+
+class Q450Memory(NamedTuple):
+    """The action that acts (..., n), and the attitude's errors e_q and e_w (..., 3)."""
+
+    action: Array
+    e_q: Array
+    e_w: Array
+
+
+class Q450Coupling:
+    """The coupling at the top; without a base, the action is the wrench.
+
+    Args:
+        plant: of the environment.
+        recipe: of the residual.
+        gains: of the base's position loop, for s; None without one.
+    """
+
+    reward_scales: ClassVar[Mapping[str, float]] = {
+        "alive": 1.0,
+        "position": -0.25,
+        "velocity": -0.25,
+        "attitude": -1.0,
+        "turning": -0.5,
+        "residual": -0.01,
+        "fall": -100.0,
+    }
+
+    def __init__(self, plant: Plant, recipe: Recipe, gains: Any) -> None:
+        torque = recipe.base == NO_BASE
+        self.actions: tuple[str, ...]
+        if torque:
+            self.actions = ("u1", "u2", "u3", "u4")
+            box = plant.action.box()
+            self._limit = (box.high - box.low) / 2
+        elif recipe.channel == "position":
+            self.actions = AXES
+            self._limit = np.full(3, recipe.limit)
+        else:
+            whole = recipe.channel == "cascade"
+            self.actions = AXES + TURNS if whole else TURNS
+            self._limit = recipe.limit * np.repeat([1.0, TURNING] if whole else [TURNING], 3)
+        self._attitude_alone = recipe.channel == "attitude" and not torque
+        loop: Any = getattr(gains, "position", None)
+        self._gains = (loop.k_p, loop.k_d) if hasattr(loop, "k_p") else None
+        self._at = plant.observation.slices
+        own = [field for field in plant.observation.fields if field.name in PASSED_ON]
+        self.features = Layout(
+            (
+                Field("e", 3, "m", -1.0, 1.0, "position_ref - position"),
+                Field("ed", 3, "m/s", -10.0, 10.0, "velocity_ref - velocity"),
+                Field("s", 3, "m", -10.0, 10.0, "the base's sliding variable"),
+                Field("sigma_p", 3, "m/s^2", -100.0, 100.0, "TDE error of the position loop, a sample ago"),
+                Field("sigma_q", 3, "rad/s^2", -1e3, 1e3, "TDE error of the attitude loop, a sample ago"),
+                Field("e_q", 3, "rad", -1.0, 1.0, "attitude error of the cascade, body axes"),
+                Field("e_w", 3, "rad/s", -30.0, 30.0, "its rate"),
+                Field("force_command", 3, "N", -100.0, 100.0, "of the position loop, a sample ago, world axes"),
+                Field("c", 1, "m/s^2", 0.0, 100.0, "gain of the position loop's robust term"),
+                *own,
+                Field("action", len(self.actions), "1", -1.0, 1.0, "of the agent, a decision ago"),
+            )
+        )
+        self._own = [self._at[field.name] for field in own]
+
+    def start(self, observation: Array) -> Q450Memory:
+        nothing = np.zeros((*observation.shape[:-1], 3), observation.dtype)
+        return Q450Memory(np.zeros((*nothing.shape[:-1], len(self.actions)), observation.dtype), nothing, nothing)
+
+    def observe(self, observation: Array, inside: Mapping[str, Array], memory: Q450Memory) -> tuple[Array, Q450Memory]:
+        e, ed = self._errors(observation)
+        nothing = np.zeros_like(e)
+        s = nothing if self._gains is None else sliding_variable(e, ed, *self._gains)
+        e_q, e_w, c = inside.get("e_q", nothing), inside.get("e_w", nothing), inside.get("c_p")
+        parts = [
+            e,
+            ed,
+            s,
+            inside.get("sigma_p", nothing),
+            inside.get("sigma_q", nothing),
+            e_q,
+            e_w,
+            inside.get("force_command", nothing),
+            nothing[..., :1] if c is None else c[..., None],
+            *(observation[..., part] for part in self._own),
+            memory.action,
+        ]
+        return np.concatenate(parts, axis=-1, dtype=observation.dtype), memory._replace(e_q=e_q, e_w=e_w)
+
+    def decide(self, memory: Q450Memory, action: Array) -> Q450Memory:
+        return memory._replace(action=np.minimum(np.maximum(action, -1.0), 1.0).astype(memory.action.dtype))
+
+    def advance(self, memory: Q450Memory) -> tuple[Array, Q450Memory]:
+        du = (self._limit * memory.action).astype(memory.action.dtype, copy=False)
+        return (np.concatenate([np.zeros_like(du), du], axis=-1) if self._attitude_alone else du), memory
+
+    def reward_terms(self, observation: Array, memory: Q450Memory, fell: Any) -> dict[str, Array]:
+        e, ed = self._errors(observation)
+        action = memory.action
+        errors = dict(zip(SCALES, (e, ed, memory.e_q, memory.e_w), strict=True))
+        return {
+            "alive": np.ones(observation.shape[:-1]),
+            **{name: np.minimum(np.sqrt(np.vecdot(v, v)) / SCALES[name], WORST) for name, v in errors.items()},
+            "residual": np.vecdot(action, action),
+            "fall": np.asarray(fell, dtype=np.float64),
+        }
+
+    def _errors(self, observation: Array) -> tuple[Array, Array]:
+        at = self._at
+        return (
+            observation[..., at["position_ref"]] - observation[..., at["position"]],
+            observation[..., at["velocity_ref"]] - observation[..., at["velocity"]],
+        )

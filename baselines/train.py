@@ -1,0 +1,164 @@
+"""Training a residual with PPO or SAC, in intervals that can be continued after any interruption."""
+
+from __future__ import annotations
+
+import functools
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import torch
+from stable_baselines3 import PPO, SAC
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import configure
+from stable_baselines3.common.utils import set_random_seed
+from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv, VecMonitor, VecNormalize
+
+from baselines.checkpoint import Checkpoints
+from baselines.export import exported
+from baselines.recipe import Recipe
+from baselines.residual import Residual
+from baselines.residual_env import ResidualEnv
+from baselines.run import Progress, Run, Training, environment_kwargs, single
+from baselines.vec_env import ResidualVecEnv
+
+HIDDEN = (64, 64)
+CRITIC = (256, 256)  # of SAC
+HARDER, EASIER = 0.8, 0.5  # shares of training episodes without a fall: above, below which the level moves
+ENDED = 8  # episodes that such a share needs
+SAC_INTERVAL = 4096  # decisions between two checkpoints
+
+
+def train(training: Training, out: str | Path, on_progress: Callable[[Progress], None] | None = None) -> Path:
+    """Train, or continue, and return the folder of the best policy so far.
+
+    `out` holds `run.json` (what was asked for, versions), `checkpoints/`, `tensorboard/`, `learning_curve.csv` (a row
+    a held-out test) and `policy/`, the best policy by the test's score.
+
+    Raises:
+        TrainingError: if `out` holds a run of another configuration.
+    """
+    run = Run(training, Path(out), on_progress)
+    env, residual = _environments(training, run)
+    try:
+        _Trainer(run, env, residual).go()
+    finally:
+        env.close()
+    return run.exported
+
+
+class _Trainer:
+    def __init__(self, run: Run, env: VecEnv, residual: Residual) -> None:
+        self.run, self.residual = run, residual
+        training, task = run.training, run.task
+        options = {**(task.ppo if training.algo == "ppo" else task.sac), **training.options}
+        self.env = VecNormalize(VecMonitor(env), gamma=options["gamma"])
+        self.model = _model(training, self.env, options)
+        self.model.set_logger(configure(str(run.folder / "tensorboard"), ["tensorboard"]))
+        self.interval = SAC_INTERVAL
+        if training.algo == "ppo":
+            self.interval = task.rollouts * options["n_steps"] * env.num_envs
+        self.checkpoints = Checkpoints(run.folder / "checkpoints")
+        level = task.level if training.level is None else training.level
+        state = self.checkpoints.restore(self.model, self.env) or {"interval": 0, "steps": 0, "level": level}
+        self.number, self.steps, self.level = state["interval"], state["steps"], state["level"]
+        run.state |= {name: state[name] for name in run.state if name in state}
+
+    def go(self) -> None:
+        run, training = self.run, self.run.training
+        self._report(self.steps)
+        while self.steps < training.steps and run.state["stale"] < training.patience:
+            self._learn()
+            if self.number % training.test_every == 0 or self.steps >= training.steps:
+                found = run.test(exported(self.model, self.env), self.residual, self.steps, {"level": self.level})
+                self._log({f"test/{name}": value for name, value in found.items()})
+            state = {"interval": self.number, "steps": self.steps, "level": self.level, **run.state}
+            self.checkpoints.save(self.model, self.env, state)
+
+    def _learn(self) -> None:
+        """One interval, from fresh episodes."""
+        run, model = self.run, self.model
+        words = np.random.SeedSequence([run.training.seed, self.number]).generate_state(2)
+        seed, env_seed = (int(word >> 1) for word in words)
+        set_random_seed(seed)
+        self.env.seed(env_seed)
+        self.env.set_options({"disturbances": run.task.training(self.level)})
+        model._last_obs = None  # so that `learn` resets the environments
+        watcher, began = _Watcher(self._report), time.perf_counter()
+        wanted = min(self.interval, run.training.steps - self.steps)
+        model.learn(wanted, callback=watcher, reset_num_timesteps=False, log_interval=1)
+        rate = (model.num_timesteps - self.steps) / (time.perf_counter() - began)
+        survived = watcher.survived()
+        if survived is not None:
+            step = 0.1 if survived > HARDER else -0.05 if survived < EASIER else 0.0
+            self.level = round(min(max(self.level + step, 0.0), 1.0), 3)
+            self._log({"train/survived": survived})
+        self.number, self.steps = self.number + 1, model.num_timesteps
+        self._log({"train/level": self.level, "time/steps_per_second": rate})
+
+    def _log(self, values: dict[str, float]) -> None:
+        for name, value in values.items():
+            self.model.logger.record(name, value)
+        self.model.logger.dump(self.model.num_timesteps)
+
+    def _report(self, steps: int) -> None:
+        self.run.report(steps, f"interval {self.number}, level {self.level:g}")
+
+
+class _Watcher(BaseCallback):
+    """Counts how training episodes end, and tells of progress."""
+
+    def __init__(self, on_steps: Callable[[int], None]) -> None:
+        super().__init__()
+        self._on_steps = on_steps
+        self._ended, self._fell, self._told = 0, 0, 0
+
+    def _on_step(self) -> bool:
+        for i in np.flatnonzero(self.locals["dones"]):
+            self._ended += 1
+            self._fell += not self.locals["infos"][i].get("TimeLimit.truncated", False)
+        if self.num_timesteps - self._told >= 1000:
+            self._told = self.num_timesteps
+            self._on_steps(self.num_timesteps)
+        return True
+
+    def survived(self) -> float | None:
+        """Share of the episodes that ended without a fall; None if hardly any ended."""
+        return 1.0 - self._fell / self._ended if self._ended >= ENDED else None
+
+
+def _environments(training: Training, run: Run) -> tuple[VecEnv, Residual]:
+    """Environments of a training, and the residual that they share."""
+    kwargs, task = environment_kwargs(training), run.task
+    if task.batched:
+        kwargs.pop("engine", None)  # it is one
+        count = training.envs or task.envs or 1
+        batch = gym.make_vec(training.env_id, count, vectorization_mode="vector_entry_point", dtype="float32", **kwargs)
+        env = ResidualVecEnv(batch, training.recipe)
+        return env, env.residual
+    count = training.envs or training.workers
+    makers: list[Callable[[], gym.Env[Any, Any]]] = [
+        functools.partial(_worker_env, training.env_id, kwargs, training.recipe) for _ in range(count)
+    ]
+    residual = single(training.env_id, kwargs, training.recipe).residual
+    return (DummyVecEnv(makers) if training.workers == 1 else SubprocVecEnv(makers, start_method="spawn")), residual
+
+
+def _worker_env(env_id: str, kwargs: dict[str, Any], recipe: Recipe) -> ResidualEnv:
+    torch.set_num_threads(1)
+    return single(env_id, kwargs, recipe)
+
+
+def _model(training: Training, env: VecNormalize, options: dict[str, Any]) -> Any:
+    policy: dict[str, Any] = {"activation_fn": torch.nn.Tanh, "net_arch": list(HIDDEN)}
+    common: dict[str, Any] = {"device": "cpu", "seed": training.seed}
+    if training.algo == "sac":
+        policy["net_arch"] = {"pi": list(HIDDEN), "qf": list(CRITIC)}
+        return SAC("MlpPolicy", env, policy_kwargs=policy, **options, **common)
+    own = ("log_std_init", "net_arch")
+    policy |= {name: options[name] for name in own if name in options}
+    others = {name: value for name, value in options.items() if name not in own}
+    return PPO("MlpPolicy", env, policy_kwargs=policy, **others, **common)
