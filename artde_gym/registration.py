@@ -142,20 +142,9 @@ def register_laws() -> None:
         text="biped: feedback linearisation with the nominal model (upper reference)",
         search="controllers.model_based:search_space",
     )
-    shipped = "baselines.saved:make_shipped"
-    register_controller(
-        "tde+balance",
-        shipped,
-        text="biped: TDE + a linear balance law of 28 gains that shifts feet, body and ankles",
-        policies={"ojas": "biped-balance"},
-    )
     register_controller(
         "tde+ppo",
-        shipped,
-        text="TDE + a residual that reinforcement learning (PPO) has trained for the environment",
-        policies={
-            "BipedPush-v0": "biped-push",
-            "BipedWalk-Payload-v0": "biped-walk",
-            "QuadInfinity-Payload-v0": "quadrotor-gale",
-        },
+        "baselines.saved:make_shipped",
+        text="quadrotor: TDE + a residual that reinforcement learning (PPO) has trained in a gale",
+        policies={"QuadInfinity-Payload-v0": "quadrotor-gale"},
     )

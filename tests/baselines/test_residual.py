@@ -32,7 +32,7 @@ ENVIRONMENTS = {
     "QuadInfinity-Payload-v0": ("q450", {"duration": 3.0}),
 }
 SLOW = {"computed-torque"}
-LAWS = [name for name in registered_controllers() if name not in ("tde+balance", "tde+ppo")]
+LAWS = [name for name in registered_controllers() if name != "tde+ppo"]
 QUADROTOR_ONLY, BIPED_ONLY = {"asmc", "indi", "geometric"}, {"computed-torque"}
 CASES = [
     (env_id, base)
