@@ -6,11 +6,12 @@ from typing import Any
 
 from artde_gym.errors import UnknownNameError, among
 from artde_gym.registration import GainRange
-from controllers.policies import Plant, Policy, make_law
+from controllers.biped import make_biped
+from controllers.policies import Plant, Policy
 from controllers.presets import gain_ranges
 from controllers.quadrotor import make_quadrotor
 
-_MAKERS = {"ojas": make_law, "q450": make_quadrotor}
+_MAKERS = {"ojas": make_biped, "q450": make_quadrotor}
 
 
 def make_for_robot(env: Any, *, law: str, **options: Any) -> Policy:
@@ -19,7 +20,7 @@ def make_for_robot(env: Any, *, law: str, **options: Any) -> Policy:
     Args:
         env: the environment that it will drive.
         law: name of the law.
-        options: of the robot's own function in `controllers.policies` or `controllers.quadrotor`.
+        options: of the robot's own function in `controllers.biped` or `controllers.quadrotor`.
 
     Raises:
         UnknownNameError: for a robot that nobody drives, a law that the robot does not have, or an unknown preset.
