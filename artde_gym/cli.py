@@ -23,7 +23,7 @@ from artde_gym.evaluation import frontier as run_frontier
 from artde_gym.evaluation import tune as run_tuning
 from artde_gym.evaluation.claims import CLAIMS, judge
 from artde_gym.evaluation.console import print_claims, print_result
-from artde_gym.evaluation.environments import ours
+from artde_gym.evaluation.environments import ours, robot_of
 from artde_gym.evaluation.evaluate import Update
 from artde_gym.evaluation.frontier_console import print_frontier
 from artde_gym.evaluation.frontier_standard import STANDARDS
@@ -64,7 +64,10 @@ def main() -> None:
 def evaluate(
     controllers: Annotated[str, typer.Option(help="Names, comma-separated; see `list`.")] = "tde,atde,artde",
     scenario: Annotated[
-        str | None, typer.Option(help="Names, comma-separated; see `list`. Default: the main ones of the environment.")
+        str | None,
+        typer.Option(
+            help="Names, comma-separated; see `list`. Default: the environment's main ones, or its first in batches."
+        ),
     ] = None,
     env: Annotated[str | None, typer.Option(help=f"Environment id. Default: the scenarios', or {WALK}.")] = None,
     episodes: Annotated[int, typer.Option(help="Seeded episodes of each controller in each scenario.")] = 3,
@@ -87,6 +90,8 @@ def evaluate(
     if scenario is None:
         env = env or WALK
         scenario = MAIN_SCENARIOS.get(env)
+        if scenario is not None and backend == "batch":
+            scenario = scenario.split(",")[0]
     kwargs = _json("--env-kwargs", env_kwargs)
     if engine is not None:
         kwargs["engine"] = engine
@@ -250,18 +255,23 @@ def reproduce(
 
 @app.command("list")
 def list_() -> None:
-    """Show environments, scenarios and controllers."""
+    """Show environments, scenarios, controllers and what frontiers vary."""
     console = Console()
-    environments = Table("environment", title="Environments", title_justify="left")
+    environments = Table("environment", "robot", "backends", title="Environments", title_justify="left")
     for name in ours():
-        environments.add_row(name)
+        backends = "single, batch" if gym.spec(name).vector_entry_point else "single"
+        environments.add_row(name, robot_of(name), backends)
     scenarios = Table("scenario", "environment", "arguments", "what it is", title="Scenarios", title_justify="left")
     for entry in SCENARIOS.values():
         scenarios.add_row(entry.name, entry.env_id, json.dumps(dict(entry.kwargs)), entry.text)
     known = Table("controller", "what it is", title="Controllers", title_justify="left")
     for name, spec in registered_controllers().items():
         known.add_row(name, spec.text)
-    for table in (environments, scenarios, known):
+    varied = Table("robot", "varied", "from", "to", "step", "harder", title="Frontiers", title_justify="left")
+    for robot, standard in STANDARDS.items():
+        for path, (low, high, step, harder) in standard.ranges.items():
+            varied.add_row(robot, path, f"{low:g}", f"{high:g}", f"{step:g}", harder)
+    for table in (environments, scenarios, known, varied):
         console.print(table)
 
 

@@ -18,13 +18,14 @@ def make(name: str, env: Any, **overrides: Any) -> Any:
     """The controller called `name` for an environment, or for a vector of equal ones.
 
     Args:
-        name: "tde", "atde", "artde", "artde-robust", "pid", "tde+c", "tde+kd", "computed-torque", or whatever was given
-            to `artde_gym.register_controller`.
-        env: the environment that it will drive.
-        overrides: gains in place of the preset's, and `preset="thesis"` or `"robust"`.
+        name: "tde", "atde", "artde", "artde-robust", "pid", "tde+c", "tde+kd", for the biped "computed-torque", for the
+            quadrotor "asmc", "geometric", "indi", or whatever was given to `artde_gym.register_controller`.
+        env: the environment that it will drive; its robot decides which policy the name stands for.
+        overrides: gains in place of the preset's, and `preset="thesis"`, `"robust"`, ...; of the quadrotor's two loops
+            a gain has the suffix `_p` (position) or `_q` (attitude).
 
     Raises:
-        UnknownNameError: for a controller or preset that nobody registered.
+        UnknownNameError: for a controller that nobody registered or that the robot does not have, or an unknown preset.
         GainError: for an unknown gain or a value that is not allowed.
     """
     return make_controller(name, env, **overrides)

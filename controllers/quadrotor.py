@@ -32,31 +32,30 @@ class QuadrotorPolicy(Policy):
         own = {"position": position(gains.position, period), "attitude": attitude(gains.attitude, period)}
         super().__init__(name, plant, dataclasses.replace(gains, **own))
         self._period = period
-        field = plant.observation
-        vectors = ("position", "velocity", "body_rates", *(f"{part}_ref" for part in _REFERENCES))
-        self._vectors = {name: field[name] for name in vectors}
-        self._rotation, self._wrench = field["rot_body_to_world"].start, field["wrench_applied"].start
-        self._yaw, self._yaw_rate = field["yaw_ref"].start, field["yaw_rate_ref"].start
+        self._fields = plant.observation
 
     def read(self, observation: Array) -> Flight:
         columns = np.ascontiguousarray(np.moveaxis(observation, -1, 0))
-        last = (*range(1, columns.ndim), 0)
-        vector = {name: columns[part].transpose(last) for name, part in self._vectors.items()}
-        first, wrench = self._rotation, self._wrench
-        x, y, z = ((columns[first + i], columns[first + 3 + i], columns[first + 6 + i]) for i in range(3))
+        fields, last = self._fields, (*range(1, columns.ndim), 0)
+
+        def vector(name: str) -> Array:
+            return columns[fields[name]].transpose(last)
+
+        rotation, wrench = columns[fields["rot_body_to_world"]], columns[fields["wrench_applied"]]
+        x, y, z = ((rotation[i], rotation[3 + i], rotation[6 + i]) for i in range(3))
         return Flight(
-            vector["position"],
-            vector["velocity"],
-            (x, y, z),
-            vector["body_rates"],
-            vector["position_ref"],
-            vector["velocity_ref"],
-            vector["acceleration_ref"],
-            vector["jerk_ref"],
-            columns[self._yaw],
-            columns[self._yaw_rate],
-            columns[wrench],
-            columns[wrench + 1 : wrench + 4].transpose(last),
+            position=vector("position"),
+            velocity=vector("velocity"),
+            axes=(x, y, z),
+            rates=vector("body_rates"),
+            position_ref=vector("position_ref"),
+            velocity_ref=vector("velocity_ref"),
+            acceleration_ref=vector("acceleration_ref"),
+            jerk_ref=vector("jerk_ref"),
+            yaw_ref=columns[fields["yaw_ref"]][0],
+            yaw_rate_ref=columns[fields["yaw_rate_ref"]][0],
+            thrust_applied=wrench[0],
+            torque_applied=wrench[1:].transpose(last),
         )
 
     def start(self, signals: Flight) -> Memory:
@@ -82,9 +81,6 @@ class QuadrotorPolicy(Policy):
         named["attitude_error"] = np.asarray(np.remainder(error + np.pi, 2 * np.pi) - np.pi)
         named["force_command"] = memory.force
         return named
-
-
-_REFERENCES = ("position", "velocity", "acceleration", "jerk")
 
 
 def _roll_pitch_yaw(axes: Axes) -> Array:

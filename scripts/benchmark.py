@@ -1,15 +1,17 @@
 """Speed of the environments as ratios measured in one run, so that they hold on any machine.
 
-make benchmark                              ratios, about a minute
+make benchmark                              ratios, about two minutes
 make benchmark ARGS="--steps 1000000"       memory over a million steps too, some minutes
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import statistics
 import time
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,7 @@ import controllers
 
 WALK = 5900  # steps: two seconds of standing, two steps, standing again
 TURN = 50  # steps
+FLIGHT = 2000  # control periods
 RESETS = 200
 
 
@@ -31,33 +34,113 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="write the figures to this file")
     options = parser.parse_args()
     figures = {"version": artde_gym.__version__, **walking(), **resetting(), **memory(options.steps)}
+    figures |= {**flying(), **fleets(), **fleet_memory()}
     for name, value in figures.items():
-        print(f"{name:42} {value:.3f}" if isinstance(value, float) else f"{name:42} {value}")
+        print(f"{name:72} {value:.3f}" if isinstance(value, float) else f"{name:72} {value}")
     if options.json:
         options.json.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
 
 
-def walking() -> dict[str, float]:
-    """Rates of the same walk: closed loop, environment alone, bare engine; the same torques, so the same contacts.
+Job = Callable[[], None]
 
-    All of them advance in turns of a few steps, so that a machine whose speed drifts is as fast for each; a variant's
-    time is the median of its turns, which a burst of other work on the machine does not move.
+
+def in_turns(variants: Mapping[str, Callable[[], Job]], rounds: int) -> dict[str, float]:
+    """Seconds of computing that each variant takes for its job of a round, which it prepares untimed.
+
+    All of them advance in turns, so that a machine whose speed drifts is as fast for each; a variant's time is the
+    median of its turns, which a burst of other work on the machine does not move. Other processes' time is left out.
     """
-    loops = {"tde": ClosedLoop("tde"), "artde": ClosedLoop("artde")}
-    replays = {"environment": EnvironmentAlone(), "bare": BareEngine()}
-    turns: dict[str, list[float]] = {name: [] for name in (*loops, *replays)}
-    for _ in range(WALK // TURN):
-        for name, loop in loops.items():
-            start = time.perf_counter()
-            loop.advance(TURN)
-            turns[name].append(time.perf_counter() - start)
-        for name, replay in replays.items():
-            torques = [replay.prepare(torque) for torque in loops["artde"].torques[-TURN:]]
-            start = time.perf_counter()
-            for torque in torques:
-                replay.step(torque)
-            turns[name].append(time.perf_counter() - start)
-    times = {name: statistics.median(durations) for name, durations in turns.items()}
+    turns: dict[str, list[float]] = {name: [] for name in variants}
+    for _ in range(rounds):
+        for name, prepare in variants.items():
+            job = prepare()
+            start = time.process_time()
+            job()
+            turns[name].append(time.process_time() - start)
+    return {name: statistics.median(durations) for name, durations in turns.items()}
+
+
+class ClosedLoop:
+    """A controller drives an environment; `actions` remembers how."""
+
+    def __init__(self, name: str, env: Any) -> None:
+        self.env = env
+        self.policy = controllers.make(name, env)
+        self.observation, _ = env.reset(seed=0)
+        self.state = None
+        self.actions: list[np.ndarray] = []
+
+    def turn(self) -> Job:
+        return self._advance
+
+    def _advance(self) -> None:
+        for _ in range(TURN):
+            action, self.state = self.policy.predict(self.observation, self.state)
+            self.observation, *_ = self.env.step(action)
+            self.actions.append(action)
+
+
+class Replay:
+    """The last actions of a closed loop once more, in an environment alone."""
+
+    def __init__(self, loop: ClosedLoop, env: Any) -> None:
+        self.loop, self.env = loop, env
+        env.reset(seed=0)
+
+    def turn(self) -> Job:
+        actions = [self.convert(action) for action in self.loop.actions[-TURN:]]
+
+        def job() -> None:
+            for action in actions:
+                self.step(action)
+
+        return job
+
+    def convert(self, action: np.ndarray) -> Any:
+        return action
+
+    def step(self, action: Any) -> None:
+        self.env.step(action)
+
+
+class BareWalk(Replay):
+    """What a script on PyBullet cannot do without: write torques, step, read the joints."""
+
+    def __init__(self, loop: ClosedLoop, env: Any) -> None:
+        super().__init__(loop, env)
+        engine = env._engine
+        self.client, self.robot, self.joints = engine._client, engine._robot, engine._joints
+
+    def convert(self, action: np.ndarray) -> list[float]:
+        return action.tolist()
+
+    def step(self, action: list[float]) -> None:
+        bullet.setJointMotorControlArray(
+            self.robot, self.joints, bullet.TORQUE_CONTROL, forces=action, physicsClientId=self.client
+        )
+        bullet.stepSimulation(physicsClientId=self.client)
+        bullet.getJointStates(self.robot, self.joints, physicsClientId=self.client)
+
+
+class BareFlight(BareWalk):
+    """The same for a vehicle: write force and torque, step, fifteen times; read the state once."""
+
+    def step(self, action: list[float]) -> None:
+        force, torque, origin = (0.0, 0.0, action[0]), action[1:], (0.0, 0.0, 0.0)
+        for _ in range(15):
+            bullet.applyExternalForce(self.robot, -1, force, origin, bullet.LINK_FRAME, physicsClientId=self.client)
+            bullet.applyExternalTorque(self.robot, -1, torque, bullet.LINK_FRAME, physicsClientId=self.client)
+            bullet.stepSimulation(physicsClientId=self.client)
+        bullet.getBasePositionAndOrientation(self.robot, physicsClientId=self.client)
+        bullet.getBaseVelocity(self.robot, physicsClientId=self.client)
+
+
+def walking() -> dict[str, float]:
+    """Rates of the same walk: closed loop, environment alone, bare engine; the same torques, so the same contacts."""
+    tde, artde = (ClosedLoop(name, make()) for name in ("tde", "artde"))
+    environment, bare = Replay(artde, make()), BareWalk(artde, make())
+    variants = {"tde": tde.turn, "artde": artde.turn, "environment": environment.turn, "bare": bare.turn}
+    times = in_turns(variants, WALK // TURN)
     return {
         "bare engine (us a step)": 1e6 * times["bare"] / TURN,
         "env.step / bare engine (rate, >= 0.85)": times["bare"] / times["environment"],
@@ -66,55 +149,50 @@ def walking() -> dict[str, float]:
     }
 
 
-class ClosedLoop:
-    """A controller drives the environment; `torques` remembers how."""
+def flying() -> dict[str, float]:
+    """Rates of the same flight of the quadrotor, likewise, with the payload and the wind, and with nothing."""
+    figures = {}
+    for label, disturbances in (("", None), (", nothing else on board", {})):
+        artde = ClosedLoop("artde", make_quadrotor(disturbances))
+        environment = Replay(artde, make_quadrotor(disturbances))
+        bare = BareFlight(artde, make_quadrotor(disturbances))
+        times = in_turns({"artde": artde.turn, "environment": environment.turn, "bare": bare.turn}, FLIGHT // TURN)
+        figures |= {
+            f"quadrotor{label}: bare engine (us a period)": 1e6 * times["bare"] / TURN,
+            f"quadrotor{label}: env.step / bare engine (rate, >= 0.5)": times["bare"] / times["environment"],
+            f"quadrotor{label}: closed loop ARTDE / bare engine": times["bare"] / times["artde"],
+        }
+    return figures
 
-    def __init__(self, name: str) -> None:
-        self.env = make()
-        self.policy = controllers.make(name, self.env)
-        self.observation, _ = self.env.reset(seed=0)
-        self.state = None
-        self.torques: list[np.ndarray] = []
 
-    def advance(self, steps: int) -> None:
+def fleets() -> dict[str, float]:
+    """Millions of control periods a second of many quadrotors in NumPy, on this core."""
+    figures = {}
+    for size, dtype in itertools.product((1024, 4096), ("float64", "float32")):
+        artde = ClosedLoop("artde", make_fleet(size, dtype))
+        environment = Replay(artde, make_fleet(size, dtype))
+        times = in_turns({"artde": artde.turn, "environment": environment.turn}, 10)
+        label = f"batch of {size}, {dtype}"
+        target = {1024: ", >= 0.8", 4096: ", >= 1.5"}[size] if dtype == "float64" else ""
+        figures[f"{label}: environment alone (M periods/s)"] = size * TURN / times["environment"] / 1e6
+        figures[f"{label}: closed loop ARTDE (M periods/s{target})"] = size * TURN / times["artde"] / 1e6
+    return figures
+
+
+def fleet_memory() -> dict[str, float]:
+    """Growth of the process' resident memory over steps and restarts of a batch, after a warm-up."""
+    env = make_fleet(1024, "float64")
+    env.reset(seed=0)
+    still = np.zeros((1024, 4))  # they fall, and begin anew about every half second
+
+    def run(steps: int) -> None:
         for _ in range(steps):
-            action, self.state = self.policy.predict(self.observation, self.state)
-            self.observation, *_ = self.env.step(action)
-            self.torques.append(action)
+            env.step(still)
 
-
-class EnvironmentAlone:
-    """The environment under given torques."""
-
-    def __init__(self) -> None:
-        self.env = make()
-        self.env.reset(seed=0)
-
-    def prepare(self, torque: np.ndarray) -> np.ndarray:
-        return torque
-
-    def step(self, torque: np.ndarray) -> None:
-        self.env.step(torque)
-
-
-class BareEngine:
-    """What a script on PyBullet cannot do without: write torques, step, read the joints."""
-
-    def __init__(self) -> None:
-        self.env = make()
-        self.env.reset(seed=0)
-        engine = self.env._engine
-        self.client, self.robot, self.joints = engine._client, engine._robot, engine._joints
-
-    def prepare(self, torque: np.ndarray) -> list[float]:
-        return torque.tolist()
-
-    def step(self, torque: list[float]) -> None:
-        bullet.setJointMotorControlArray(
-            self.robot, self.joints, bullet.TORQUE_CONTROL, forces=torque, physicsClientId=self.client
-        )
-        bullet.stepSimulation(physicsClientId=self.client)
-        bullet.getJointStates(self.robot, self.joints, physicsClientId=self.client)
+    run(100)
+    before = resident()
+    run(500)
+    return {"batch of 1024: memory growth over 500 steps and 13 restarts each (MB, < 5)": (resident() - before) / 1e6}
 
 
 def resetting() -> dict[str, float]:
@@ -161,8 +239,18 @@ def memory(steps: int) -> dict[str, float | int]:
 
 
 def make(**kwargs: Any) -> Any:
-    """The environment without wrappers."""
+    """The biped's environment without wrappers."""
     return gym.make("BipedWalk-Payload-v0", duration=6.0, disable_env_checker=True, **kwargs).unwrapped
+
+
+def make_quadrotor(disturbances: dict[str, Any] | None) -> Any:
+    """The quadrotor's environment without wrappers."""
+    return gym.make("QuadInfinity-Payload-v0", disable_env_checker=True, disturbances=disturbances).unwrapped
+
+
+def make_fleet(size: int, dtype: str) -> Any:
+    """Many quadrotors."""
+    return gym.make_vec("QuadInfinity-Payload-v0", size, "vector_entry_point", dtype=dtype)
 
 
 def resident() -> int:

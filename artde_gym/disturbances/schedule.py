@@ -50,6 +50,8 @@ class Schedule:
 
     def quiet(self, first: int, end: int) -> bool:
         """Whether nothing acts, begins or ends from step `first` up to, not including, `end`."""
+        if not self._changes:  # every push begins and ends
+            return True
         acting = any(push.first < end and first <= push.end for push in self._pushes)
         return not acting and not any(first <= step < end for step in self._changes)
 

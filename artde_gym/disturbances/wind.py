@@ -28,16 +28,15 @@ BLOCK = 400  # grid points whose noise is read at once, for one vehicle
 
 Number = TypeVar("Number", float, Array)
 Vector3 = tuple[Number, Number, Number]
+Vector4 = tuple[Number, Number, Number, Number]
 
 
 class Air(NamedTuple, Generic[Number]):
-    """Parameters of the wind in the form in which they are used, `scale` worked in; velocities in m/s, lengths in m."""
+    """What of a wind does not change, in the form in which it is used, `scale` worked in; m/s and m."""
 
     steady_x: Number
     steady_y: Number
     steady_z: Number
-    ambient_keep: Number
-    ambient_kick: Number
     jet_x: Number
     jet_y: Number
     jet_z: Number
@@ -48,33 +47,32 @@ class Air(NamedTuple, Generic[Number]):
     axis_y: Number
     axis_z: Number
     fading: Number
-    gust_keep: Number
-    gust_kick: Number
-
-
-CALM: Air[float] = Air._make([0.0] * 17)
-"""Air that does not move."""
 
 
 def air(wind: Mapping[str, Any] | None) -> Air[float]:
     """The air of a realised disturbance `wind`, or calm air."""
     if wind is None:
-        return CALM
-    scale, direction = wind["scale"], wind["fan_direction"]
+        return Air._make([0.0] * len(Air._fields))
+    direction = wind["fan_direction"]
     axis = [component / math.hypot(*direction) for component in direction]
-    ambient_keep, gust_keep = (math.exp(-GRID / wind[name]) for name in ("ambient_time", "turbulence_time"))
     numbers = (
-        *(scale * component for component in wind["steady"]),
-        ambient_keep,
-        scale * wind["ambient"] * math.sqrt(1.0 - ambient_keep**2),
-        *(scale * wind["fan_speed"] * component for component in axis),
+        *(wind["scale"] * component for component in wind["steady"]),
+        *(wind["scale"] * wind["fan_speed"] * component for component in axis),
         *wind["fan_place"],
         *axis,
         -0.5 / wind["fan_radius"] ** 2,
-        gust_keep,
-        wind["turbulence"] * math.sqrt(1.0 - gust_keep**2),
     )
     return Air._make(numbers)
+
+
+def processes(wind: Mapping[str, Any] | None) -> tuple[list[float], list[float]]:
+    """exp(-GRID / T) and std sqrt(1 - exp(-2 GRID / T)) of the four processes: ambient x, y, z and turbulence."""
+    if wind is None:
+        return [0.0] * 4, [0.0] * 4
+    ambient, gust = (math.exp(-GRID / wind[name]) for name in ("ambient_time", "turbulence_time"))
+    ambient_kick = wind["scale"] * wind["ambient"] * math.sqrt(1.0 - ambient**2)
+    gust_kick = wind["turbulence"] * math.sqrt(1.0 - gust**2)
+    return [ambient] * 3 + [gust], [ambient_kick] * 3 + [gust_kick]
 
 
 def advance(keep: Number, kick: Number, state: Number, noise: Number) -> Number:
@@ -83,24 +81,21 @@ def advance(keep: Number, kick: Number, state: Number, noise: Number) -> Number:
 
 
 def velocity(
-    air: Air[Number],
-    ambient: Vector3[Number],
-    gust: Number,
-    position: Vector3[Number],
-    exp: Callable[[Number], Number],
+    air: Air[Number], states: Vector4[Number], position: Vector3[Number], exp: Callable[[Number], Number]
 ) -> Vector3[Number]:
-    """Velocity of the air at `position`, given the states of its processes; world axes.
+    """Velocity of the air at `position`, given the states of the processes; world axes.
 
     `exp` is the exponential function for this kind of number.
     """
+    ambient_x, ambient_y, ambient_z, turbulence = states
     x, y, z = position[0] - air.place_x, position[1] - air.place_y, position[2] - air.place_z
     along = x * air.axis_x + y * air.axis_y + z * air.axis_z
     radius_squared = x * x + y * y + z * z - along * along
-    jet = exp(air.fading * radius_squared) * (1.0 + gust)
+    jet = exp(air.fading * radius_squared) * (1.0 + turbulence)
     return (
-        air.steady_x + ambient[0] + jet * air.jet_x,
-        air.steady_y + ambient[1] + jet * air.jet_y,
-        air.steady_z + ambient[2] + jet * air.jet_z,
+        air.steady_x + ambient_x + jet * air.jet_x,
+        air.steady_y + ambient_y + jet * air.jet_y,
+        air.steady_z + ambient_z + jet * air.jet_z,
     )
 
 
@@ -109,21 +104,19 @@ class Wind:
 
     def __init__(self, wind: Mapping[str, Any], key: np.uint64) -> None:
         self._air = air(wind)
+        self._keep, self._kick = processes(wind)
         self._key = np.array([key])
         self._noise: list[list[float]] = []
         self._read = 0  # grid points
-        self._ambient = (0.0, 0.0, 0.0)
-        self._gust = 0.0
+        self._states: Vector4[float] = (0.0, 0.0, 0.0, 0.0)
 
-    def next(self, position: tuple[float, float, float]) -> tuple[float, float, float]:
+    def next(self, position: Vector3[float]) -> Vector3[float]:
         """Velocity of the air at `position` (m) from this grid point to the next (m/s), world axes."""
-        velocity_now = velocity(self._air, self._ambient, self._gust, position, math.exp)
+        velocity_now = velocity(self._air, self._states, position, math.exp)
         if not self._noise:
             block = np.arange(self._read, self._read + BLOCK, dtype=np.uint64)
             self._noise = uniform_noise(self._key, block).T[::-1].tolist()  # to be read from the end
             self._read += BLOCK
-        nx, ny, nz, gust = self._noise.pop()
-        (x, y, z), keep, kick = self._ambient, self._air.ambient_keep, self._air.ambient_kick
-        self._ambient = (advance(keep, kick, x, nx), advance(keep, kick, y, ny), advance(keep, kick, z, nz))
-        self._gust = advance(self._air.gust_keep, self._air.gust_kick, self._gust, gust)
+        x, y, z, turbulence = map(advance, self._keep, self._kick, self._states, self._noise.pop())
+        self._states = x, y, z, turbulence
         return velocity_now

@@ -33,7 +33,6 @@ STEPS = 5  # physics steps from one grid point to the next
 
 _NOTHING = (0.0, 0.0, 0.0)
 _NO_JOINTS = np.zeros(0)
-_WRENCH, _THRUST = task.OBSERVATION["wrench_applied"], task.OBSERVATION["rotor_thrust"]
 
 
 @filled(shared=task.DOCUMENTATION)
@@ -94,6 +93,7 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         self._last = len(self._plan) - 1
         self.observation_space = task.OBSERVATION.box()
         self.action_space = task.ACTION.box()
+        self._low, self._high = self.action_space.low, self.action_space.high
         self._engine: Engine = make_engine(engine, self.nominal_robot, TIME_STEP)
         self._engine.place(START, _NO_JOINTS)
         self._placed = self._engine.snapshot()
@@ -126,11 +126,10 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         action = np.asarray(action, dtype=np.float64)
         if action.shape != (4,):
             raise ActionError("shape of the action", action.shape, "(4,)")
-        command = action.tolist()
-        if not math.isfinite(sum(map(abs, command))):
-            raise ActionError("action", command, "finite [u1 (N), u2, u3, u4 (Nm)]")
+        if not all(map(math.isfinite, action.tolist())):
+            raise ActionError("action", action.tolist(), "finite [u1 (N), u2, u3, u4 (Nm)]")
         before = self._rotors.thrusts
-        events = self._simulate(command)
+        events = self._simulate(np.minimum(np.maximum(action, self._low), self._high).tolist())
         self._k += 1
         observation = self._measure()
         terms = self._reward_terms(before)
@@ -138,12 +137,13 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         info: dict[str, Any] = {"time_s": self._k * self.control_period, "reward_terms": terms}
         if events:
             info["events"] = events
-        reasons = [word for word, holds in zip(task.FALL_REASONS, self._falls(), strict=True) if holds]
-        if reasons:
-            info["fall_reason"] = reasons[0]
+        falls = self._falls()
+        terminated = any(falls)
+        if terminated:
+            info["fall_reason"] = task.FALL_REASONS[falls.index(True)]
         truncated = self._k >= self._last
-        self._over = truncated or bool(reasons)
-        return observation, reward, bool(reasons), truncated, info
+        self._over = terminated or truncated
+        return observation, reward, terminated, truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
         """A picture of 640 x 480 from a camera that flies along; None without a render mode."""
@@ -222,10 +222,11 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         observation[task.MEASURED] = (*state.position, *state.velocity, *rot, *rates)
         plan = self._plan[self._k]
         observation[task.REFERENCE] = plan[:-1]
-        observation[_WRENCH] = self._wrench
-        observation[_THRUST] = self._rotors.thrusts
+        observation[task.WRENCH] = self._wrench
+        observation[task.THRUST] = self._rotors.thrusts
         observation[task.PHASE] = plan[-1]
-        self._sensors.measure(observation[:, None], np.array([self._k]))
+        if not self._sensors.ideal:
+            self._sensors.measure(observation[:, None], np.array([self._k]))
         return observation
 
     def _reward_terms(self, before: Array) -> dict[str, float]:

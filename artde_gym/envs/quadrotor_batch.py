@@ -93,6 +93,7 @@ class QuadInfinityPayloadVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         self._last = self._plan.shape[1] - 1
         self.single_observation_space = task.OBSERVATION.box(self.dtype)
         self.single_action_space = task.ACTION.box(self.dtype)
+        self._low, self._high = self.single_action_space.low[:, None], self.single_action_space.high[:, None]
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         sizes = [min(FLEET, num_envs - first) for first in range(0, num_envs, FLEET)]
@@ -131,11 +132,9 @@ class QuadInfinityPayloadVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         for i in np.flatnonzero(mask).tolist():
             if seeds[i] is not None:
                 self._np_random[i], self._np_random_seed[i] = seeding.np_random(seeds[i])
-        info = self._begin(mask)
+        info = {**self._begin(mask), "time_s": self._k * self.control_period, "_time_s": mask.copy()}
         self._over = np.zeros(self.num_envs, np.bool_) if self._over is None else self._over & ~mask
-        observation = self._truth()
-        self._sensors.measure(observation, self._k)
-        return observation.T, info
+        return self._measured(self._truth()).T, info
 
     def step(self, actions: ArrayLike) -> tuple[Array, Array, Mask, Mask, dict[str, Any]]:
         """Apply wrenches for one control period; flights that were over begin anew instead.
@@ -150,29 +149,25 @@ class QuadInfinityPayloadVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         before = [fleet.thrusts for _, fleet in self._fleets]
         events: dict[int, list[str]] = {}
         for part, fleet in self._fleets:
-            for vehicle, words in fleet.advance(commands[:, part]).items():
-                events[part.start + vehicle] = words
+            told = fleet.advance(commands[:, part]).items()
+            events.update((part.start + vehicle, words) for vehicle, words in told if not over[part.start + vehicle])
         self._k += 1
-        info = self._begin(over)
+        info = {**self._begin(over), "time_s": self._k * self.control_period, "_time_s": np.ones_like(over)}
         observation = self._truth()
         rewards, terms, reasons = self._score(observation, before)
-        self._sensors.measure(observation, self._k)
+        observation = self._measured(observation)
         rewards[over] = 0.0
         goes_on = ~over
         terminated = (reasons != 0) & goes_on
         truncated = (self._k >= self._last) & goes_on
         self._over = terminated | truncated
-        info["time_s"], info["_time_s"] = self._k * self.control_period, np.ones_like(over)
         info["reward_terms"] = {**terms, **{f"_{name}": goes_on.copy() for name in terms}}
         info["_reward_terms"] = goes_on
         if terminated.any():
-            words = np.array([None, *task.FALL_REASONS], dtype=object)
-            info["fall_reason"], info["_fall_reason"] = words[np.where(terminated, reasons, 0)], terminated.copy()
+            words = {i: task.FALL_REASONS[reasons[i] - 1] for i in np.flatnonzero(terminated).tolist()}
+            info["fall_reason"], info["_fall_reason"] = self._objects(words)
         if events:
-            told = np.full(self.num_envs, None, dtype=object)
-            for i, texts in events.items():
-                told[i] = texts
-            info["events"], info["_events"] = told, told != np.array(None)
+            info["events"], info["_events"] = self._objects(events)
         return observation.T, rewards, terminated, truncated, info
 
     def _commands(self, actions: ArrayLike) -> Array:
@@ -186,7 +181,7 @@ class QuadInfinityPayloadVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         if not np.isfinite(commands).all():
             i = int(np.flatnonzero(~np.isfinite(commands).all(axis=0))[0])
             raise ActionError(f"action of environment {i}", given[i].tolist(), "finite [u1 (N), u2, u3, u4 (Nm)]")
-        return commands
+        return np.clip(commands, self._low, self._high, out=commands)
 
     def _mask(self, given: Any) -> Mask:
         if given is None:
@@ -211,17 +206,24 @@ class QuadInfinityPayloadVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         """Begin new flights where the mask is true; returns what is to be told of them."""
         if not mask.any():
             return {}
-        drawn = np.full(self.num_envs, None, dtype=object)
+        drawn: dict[int, Mapping[str, Any]] = {}
         for part, fleet in self._fleets:
             for vehicle in np.flatnonzero(mask[part]).tolist():
-                rng = self._np_random[part.start + vehicle]
-                realised = drawn[part.start + vehicle] = self._disturbances.draw(rng)
-                keys = draw_keys(rng, task.STREAMS)
-                fleet.begin(vehicle, realised, keys[0])
-                self._sensors.begin(part.start + vehicle, realised, keys[1:])
+                i = part.start + vehicle
+                drawn[i] = self._disturbances.draw(self._np_random[i])
+                keys = draw_keys(self._np_random[i], task.STREAMS)
+                fleet.begin(vehicle, drawn[i], keys[0])
+                self._sensors.begin(i, drawn[i], keys[1:])
         self._k[mask] = 0
-        time = self._k * self.control_period
-        return {"time_s": time, "_time_s": mask.copy(), "disturbances": drawn, "_disturbances": mask.copy()}
+        values, known = self._objects(drawn)
+        return {"disturbances": values, "_disturbances": known}
+
+    def _objects(self, known: Mapping[int, Any]) -> tuple[NDArray[Any], Mask]:
+        """What is known of some environments as an array, and the mask of these."""
+        values, mask = np.full(self.num_envs, None, dtype=object), np.zeros(self.num_envs, np.bool_)
+        for i, value in known.items():
+            values[i], mask[i] = value, True
+        return values, mask
 
     def _truth(self) -> Array:
         """The observation without errors of measurement (size, n)."""
@@ -229,26 +231,31 @@ class QuadInfinityPayloadVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         together = self._k.min() == self._k.max()
         for part, fleet in self._fleets:
             block, bodies = out[:, part], fleet.bodies
-            block[task.OBSERVATION["position"]] = bodies.origin()
-            block[task.OBSERVATION["velocity"]] = bodies.origin_velocity()
-            block[task.OBSERVATION["rot_body_to_world"]] = bodies.rot.reshape(9, -1)
-            block[task.OBSERVATION["body_rates"]] = bodies.rates
+            block[task.POSITION] = bodies.origin()
+            block[task.VELOCITY] = bodies.origin_velocity()
+            block[task.ROT] = bodies.rot.reshape(9, -1)
+            block[task.RATES] = bodies.rates
             plan = self._plan[:, self._k[:1]] if together else self._plan.take(self._k[part], axis=1)
             block[task.REFERENCE] = plan[:-1]
-            block[task.OBSERVATION["wrench_applied"]] = fleet.wrenches
-            block[task.OBSERVATION["rotor_thrust"]] = fleet.thrusts
+            block[task.WRENCH] = fleet.wrenches
+            block[task.THRUST] = fleet.thrusts
             block[task.PHASE] = plan[-1]
         return out
 
+    def _measured(self, truth: Array) -> Array:
+        """What the sensors make of it, in place."""
+        if not self._sensors.ideal:
+            self._sensors.measure(truth, self._k)
+        return truth
+
     def _score(self, truth: Array, before: Sequence[Array]) -> tuple[Array, dict[str, Array], NDArray[np.int8]]:
         """Rewards, their terms, and the number of the reason of a fall, counted from 1, 0 without one; all (n,)."""
-        at = task.OBSERVATION
         terms = {name: np.empty(self.num_envs, self.dtype) for name in task.REWARD_SCALES}
         rewards, reasons = np.empty(self.num_envs), np.zeros(self.num_envs, np.int8)
         for (part, fleet), thrusts in zip(self._fleets, before, strict=True):
             block = truth[:, part]
-            error = block[at["position_ref"]] - block[at["position"]]
-            velocity_error = block[at["velocity_ref"]] - block[at["velocity"]]
+            error = block[task.OBSERVATION["position_ref"]] - block[task.POSITION]
+            velocity_error = block[task.OBSERVATION["velocity_ref"]] - block[task.VELOCITY]
             up = fleet.bodies.rot[2, 2]
             change = fleet.thrusts - thrusts
             own = task.reward_terms(
@@ -259,8 +266,8 @@ class QuadInfinityPayloadVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
                 total = total + scale * own[name]
                 terms[name][part] = own[name]
             rewards[part] = self.control_period * total
-            x, y, z = block[at["position"]]
-            falls = task.falls((x, y, z), up, _square(block[at["body_rates"]]))
+            x, y, z = block[task.POSITION]
+            falls = task.falls((x, y, z), up, _square(block[task.RATES]))
             for number in range(len(falls), 0, -1):  # the first reason wins
                 reasons[part][falls[number - 1]] = number
         return rewards, terms, reasons

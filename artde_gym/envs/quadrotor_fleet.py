@@ -18,7 +18,7 @@ from artde_gym.disturbances.ground_effect import thrust_gain
 from artde_gym.disturbances.kinds import KINDS
 from artde_gym.disturbances.noise import uniform_noise
 from artde_gym.disturbances.schedule import Push
-from artde_gym.disturbances.wind import GRID, Air, advance, air, velocity
+from artde_gym.disturbances.wind import GRID, Air, advance, air, processes, velocity
 from artde_gym.envs import quadrotor_task as task
 from artde_gym.robots import q450 as robot
 from artde_gym.robots.lag import follow, lag_shares
@@ -68,9 +68,9 @@ class Fleet:
         self._delay = np.zeros(n, np.int64)  # control periods
         self._late: Array | None = None  # aims of the last periods (SLOTS, 4, n), once a vehicle needs them
         self._air = np.zeros((len(Air._fields), n), dtype)
-        self._here = Air(*self._air)  # the same numbers
+        self._here = Air._make(self._air)  # the same numbers
         self._keys = np.zeros(n, np.uint64)
-        self._winds = np.zeros((4, n), dtype)  # states of the wind's processes: ambient, gust
+        self._wind = np.zeros((4, n), dtype)  # states of the wind's processes
         self._keep, self._kick = np.zeros((4, n), dtype), np.zeros((4, n), dtype)
         self._windy = False
         self._ground_effect = np.zeros(n, dtype)
@@ -81,16 +81,12 @@ class Fleet:
         """Begin an episode of one vehicle, at rest in balance, with realised disturbances and the key of its wind."""
         self._begun[vehicle] = self._step
         self._begin_rotors(vehicle, realised)
-        self._air[:, vehicle] = air(realised.get("wind"))
+        wind = realised.get("wind")
+        self._air[:, vehicle] = air(wind)
+        self._keep[:, vehicle], self._kick[:, vehicle] = processes(wind)
+        self._wind[:, vehicle] = 0.0
         self._keys[vehicle] = key
-        self._winds[:, vehicle] = 0.0
-        here = self._here
-        for rows, ambient, gust in (
-            (self._keep, here.ambient_keep, here.gust_keep),
-            (self._kick, here.ambient_kick, here.gust_kick),
-        ):
-            rows[:3, vehicle], rows[3, vehicle] = ambient[vehicle], gust[vehicle]
-        self._windy |= "wind" in realised
+        self._windy |= wind is not None
         self._ground_effect[vehicle] = realised.get("ground_effect", {}).get("strength", 0.0)
 
         factor = realised.get("mass_error", {}).get("factor", 1.0)
@@ -126,7 +122,7 @@ class Fleet:
             self.thrusts, mean = follow(self.thrusts, goals, *self._shares)
             total += mean
             origin = bodies.origin()
-            wind = 0.0 if noise is None else self._wind(origin, noise[:, step])
+            wind = 0.0 if noise is None else self._blow(origin, noise[:, step])
             u1, *torques = robot.wrench(*(mean * self._gains(origin[2])))
             force = bodies.rot[:, 2] * u1
             force += robot.DRAG * (wind - bodies.origin_velocity())
@@ -164,11 +160,12 @@ class Fleet:
         index = (self._step - self._begun).astype(np.uint64) + np.arange(self._steps, dtype=np.uint64)[:, None]
         return uniform_noise(self._keys, index, self.thrusts.dtype)
 
-    def _wind(self, origin: Array, noise: Array) -> Array:
+    def _blow(self, origin: Array, noise: Array) -> Array:
         """Velocity of the air at each vehicle's place during this step (3, n) (m/s), world axes."""
-        (x, y, z), (ax, ay, az, gust) = origin, self._winds
-        wind = np.stack(velocity(self._here, (ax, ay, az), gust, (x, y, z), np.exp))
-        self._winds = advance(self._keep, self._kick, self._winds, noise)
+        (x, y, z), (ambient_x, ambient_y, ambient_z, turbulence) = origin, self._wind
+        states = ambient_x, ambient_y, ambient_z, turbulence
+        wind = np.stack(velocity(self._here, states, (x, y, z), np.exp))
+        self._wind = advance(self._keep, self._kick, self._wind, noise)
         return wind
 
     def _gains(self, height: Array) -> Array | float:
@@ -190,11 +187,10 @@ class Fleet:
     def _push_events(self, vehicle: int, realised: Mapping[str, Any]) -> list[_Event]:
         """Pushes act for the share of a step that they cover."""
         pushes = [Push.of(entry, FINE) for entry in realised.get("push", ())]
-        missing = max(0, len(pushes) - len(self._pushes))
-        self._pushes, self._places = (
-            np.concatenate([slots, np.zeros((missing, *slots.shape[1:]), slots.dtype)])
-            for slots in (self._pushes, self._places)
-        )
+        missing = len(pushes) - len(self._pushes)
+        if missing > 0:
+            more = np.zeros((missing, *self._pushes.shape[1:]), self._pushes.dtype)
+            self._pushes, self._places = (np.concatenate([slots, more]) for slots in (self._pushes, self._places))
         self._pushes[..., vehicle] = 0.0
         events: list[_Event] = []
         for slot, push in enumerate(pushes):

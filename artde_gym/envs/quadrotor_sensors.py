@@ -11,13 +11,10 @@ from numpy.typing import DTypeLike, NDArray
 from artde_gym.arrays import Array
 from artde_gym.disturbances.mocap import Mocap
 from artde_gym.disturbances.vehicle_noise import VehicleNoise
-from artde_gym.envs.quadrotor_task import OBSERVATION
+from artde_gym.envs.quadrotor_task import POSITION, RATES, ROT, VELOCITY
 from artde_gym.errors import OptionError
 
 Measurement = Literal["ideal", "mocap"]
-
-_POSITION, _VELOCITY = OBSERVATION["position"], OBSERVATION["velocity"]
-_ROT, _RATES = OBSERVATION["rot_body_to_world"], OBSERVATION["body_rates"]
 
 
 class Sensors:
@@ -43,15 +40,18 @@ class Sensors:
         if self._noise is not None:
             self._noise.begin(vehicle, realised)
 
+    @property
+    def ideal(self) -> bool:
+        """Whether what is measured is the truth."""
+        return self._mocap is None and self._noise is None
+
     def measure(self, observation: Array, sample: NDArray[np.int64]) -> None:
         """Replace the truth in observations (size, n) by what is measured, `sample` periods after the start (n,)."""
-        if self._mocap is None and self._noise is None:
-            return
         measured = (
-            observation[_POSITION],
-            observation[_VELOCITY],
-            observation[_ROT].reshape(3, 3, -1),  # a view, as rows lie apart by the same distance
-            observation[_RATES],
+            observation[POSITION],
+            observation[VELOCITY],
+            observation[ROT].reshape(3, 3, -1),  # a view, as rows lie apart by the same distance
+            observation[RATES],
         )
         for sensor, keys in ((self._mocap, self._keys[0]), (self._noise, self._keys[1])):
             if sensor is not None:

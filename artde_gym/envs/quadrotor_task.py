@@ -53,9 +53,12 @@ OBSERVATION = Layout(
         Field("phase", 1, "1", 0.0, 1.0, "time over duration"),
     )
 )
-MEASURED = slice(0, OBSERVATION["body_rates"].stop)  # what sensors give
-REFERENCE = slice(MEASURED.stop, OBSERVATION["yaw_rate_ref"].stop)
-PHASE = OBSERVATION["phase"].start
+POSITION, VELOCITY, ROT, RATES = (
+    OBSERVATION[name] for name in ("position", "velocity", "rot_body_to_world", "body_rates")
+)
+MEASURED = slice(POSITION.start, RATES.stop)
+REFERENCE = slice(OBSERVATION["position_ref"].start, OBSERVATION["yaw_rate_ref"].stop)
+WRENCH, THRUST, PHASE = (OBSERVATION[name] for name in ("wrench_applied", "rotor_thrust", "phase"))
 ACTION = Layout(
     (
         Field(
@@ -82,8 +85,8 @@ def _heading_error(fields: Fields) -> Array:
 
 def _induced_power(fields: Fields) -> Array:
     """Sum of T^1.5 / sqrt(2 rho A), what ideal rotors need to hover (W)."""
-    disc = math.pi * robot.ROTOR_RADIUS**2
-    return (np.maximum(fields["rotor_thrust"], 0.0) ** 1.5).sum(axis=-1) / math.sqrt(2.0 * AIR_DENSITY * disc)
+    disc, thrust = math.pi * robot.ROTOR_RADIUS**2, np.maximum(fields["rotor_thrust"], 0.0)
+    return (thrust * np.sqrt(thrust)).sum(axis=-1) / math.sqrt(2.0 * AIR_DENSITY * disc)
 
 
 TRACKING = Tracking(
@@ -111,9 +114,9 @@ DOCUMENTATION = f"""\
 
 {ACTION.table()}
 
-They are allocated to the four rotors, each of which is limited to 0 to {robot.MAX_THRUST:g} N and follows its command
-as a first-order lag of {robot.ROTOR_LAG:g} s. Held for one control period. The bounds are what the rotors give of one
-of them at a time; beyond, they give what they can. Use Gymnasium's `RescaleAction` for [-1, 1].
+Held for one control period; clipped to the bounds, which are what the rotors give of each at a time; allocated to the
+four rotors, each of which is limited to 0 to {robot.MAX_THRUST:g} N and follows its command as a first-order lag of
+{robot.ROTOR_LAG:g} s. Use Gymnasium's `RescaleAction` for [-1, 1].
 
 ## Observation
 {OBSERVATION.table()}
@@ -175,7 +178,6 @@ FALL_REASONS = ("ground", "inverted", "bounds")
 
 Number = TypeVar("Number", float, Array)
 Vector3 = tuple[Number, Number, Number]
-Vector4 = tuple[Number, Number, Number, Number]
 
 
 def reward_terms(

@@ -189,13 +189,14 @@ class _Squares:
 
     def __init__(self, n: int) -> None:
         self._sums: Array = np.zeros((n, 1))
+        self._largest: Array = np.full((n, 1), np.nan)
         self._number = np.zeros(n, dtype=np.int64)
-        self.peak: Array = np.full((n, 1), np.nan)
 
     def add(self, values: Array, live: Mask | None) -> None:
         """Take in (samples, n, size)."""
-        self._sums = self._sums + _sum(np.square(values), live)
-        self.peak = np.fmax(self.peak, _largest(np.abs(values), live))
+        squares = np.square(values)
+        self._sums = self._sums + _sum(squares, live)
+        self._largest = np.fmax(self._largest, _largest(squares, live))
         self._number += len(values) if live is None else len(values) * live
 
     @property
@@ -207,6 +208,11 @@ class _Squares:
     def rms_of_all(self) -> Array:
         """(n,), the root mean square of all components together."""
         return np.sqrt(self._sums.mean(axis=-1) / _or_nan(self._number))
+
+    @property
+    def peak(self) -> Array:
+        """(n, size), each component's largest absolute value."""
+        return np.sqrt(self._largest)
 
 
 class _Mean:

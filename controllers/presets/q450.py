@@ -46,6 +46,9 @@ _ARTDE: dict[str, Any] = {
     "beta_floor": _FLOOR,
     "beta_start": _FLOOR,
 }
+_CONSTANT = _cascade(
+    ConstantGains(_M_BAR, _K_P, _K_D, **_ADAPTIVE, c=0.015), ConstantGains(_J_BAR, _K_P, _K_D, **_ADAPTIVE, c=0.055)
+)
 
 Q450: dict[tuple[str, str], Preset] = {
     ("tde", "thesis"): Preset(_both(TdeGains), _THESIS),
@@ -78,8 +81,8 @@ Q450: dict[tuple[str, str], Preset] = {
         ),
         "ours",
     ),
-    ("tde+c", "thesis"): Preset(_both(ConstantGains, **_ADAPTIVE, c=0.1), _THESIS),
-    ("tde+kd", "thesis"): Preset(_both(ConstantGains, **_ADAPTIVE, c=0.1), _THESIS),
+    ("tde+c", "thesis"): Preset(_CONSTANT, _THESIS),
+    ("tde+kd", "thesis"): Preset(_CONSTANT, _THESIS),
 }
 """(law, preset) -> gains."""
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from artde_gym.disturbances import KINDS, Disturbances
-from artde_gym.disturbances.kinds import Kind, Parameter, page
+from artde_gym.disturbances.kinds import ROBOTS, Kind, Parameter, page
 from artde_gym.errors import DisturbanceError
 
 SITES = ("torso", "chest", "left_arm", "right_arm")
@@ -302,6 +302,40 @@ def test_refusals_say_what_was_likely_meant():
     ]:
         with pytest.raises(DisturbanceError, match=words):
             parse(wrong)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("kind", KINDS.values(), ids=list(KINDS))
+def test_a_robot_refuses_the_kinds_that_it_cannot_honour(robot, kind):
+    example = {
+        p.name: words(p)[0] if p.size == 0 else [p.low] * p.size if p.size > 1 else p.low for p in kind.parameters
+    }
+    given_ = {kind.name: example}
+    if robot in kind.robots:
+        assert Disturbances.parse(given_, SITES, JOINTS, robot).entries
+        return
+    with pytest.raises(DisturbanceError) as caught:
+        Disturbances.parse(given_, SITES, JOINTS, robot)
+    assert caught.value.field == "disturbances"
+    assert caught.value.value == kind.name
+    assert robot in caught.value.allowed
+    named = caught.value.allowed.split(" (did you mean")[0].replace(",", "").split()
+    assert set(named) >= {other.name for other in KINDS.values() if robot in other.robots}
+    assert set(named).isdisjoint(other.name for other in KINDS.values() if robot not in other.robots)
+
+
+def test_each_robot_has_its_kinds_and_defaults():
+    assert {"friction", "slope", "grf_pulse", "encoder_bits", "initial_pose"} <= {
+        kind.name for kind in KINDS.values() if kind.robots == ("ojas",)
+    }
+    assert {"wind", "ground_effect", "initial_position"} == {k.name for k in KINDS.values() if k.robots == ("q450",)}
+    push = {"magnitude": 1, "start": 0}
+    for robot, body, place in (("ojas", "torso", [0.0, 0.0, 0.16]), ("q450", "body", [0.01, 0.0, -0.1])):
+        parsed = Disturbances.parse({"payload": 1.0, "push": push}, (body, "other"), JOINTS, robot)
+        realised = parsed.draw(np.random.default_rng(0))
+        assert realised["payload"]["position"] == place
+        assert realised["push"][0]["body"] == body
+        assert Disturbances.parse(realised, (body,), JOINTS, robot).draw(np.random.default_rng(1)) == realised
 
 
 KEYS = [*KINDS, *(p.name for kind in KINDS.values() for p in kind.parameters), "uniform", "normal", "choice"]

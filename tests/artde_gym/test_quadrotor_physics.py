@@ -157,17 +157,12 @@ def test_pushes_add_up_and_are_told(kind: str) -> None:
     ]
     flight = Flight(kind, {"push": pushes})
     flight.reset()
-    told = []
-    for _ in range(50):
+    told, fields = [], {}
+    for period in range(50):
         fields = flight.step(HOVER)
-        events = flight.info.get("events")
-        if events is not None:
-            told += [
-                (round(float(np.ravel(flight.info["time_s"])[-1]), 3), text)
-                for text in (events[1] if flight.batch else events)
-            ]
-    assert [text for _, text in told] == ["push 0 begins", "push 1 begins", "push 0 ends", "push 1 ends"]
-    np.testing.assert_allclose([time for time, _ in told], [0.055, 0.105, 0.155, 0.205], atol=1e-9)
+        events = flight.info.get("events", [(), ()] if flight.batch else ())
+        told += [(period, text) for text in (events[1] if flight.batch else events)]
+    assert told == [(10, "push 0 begins"), (20, "push 1 begins"), (30, "push 0 ends"), (40, "push 1 ends")]
     assert fields["velocity"][0] == pytest.approx(0.2 / q450.MASS, rel=0.03)
 
 
@@ -227,12 +222,17 @@ def test_what_moves_goes_on_moving_when_the_payload_goes(kind: str) -> None:
     flight = Flight(kind, {**loaded(drop=0.25), "push": [push]})
     start = flight.reset()
     fields = flight.fly(start["wrench_applied"], 0.3)
-    before, after = 49, 51  # 0.25 s is row 49
-    assert np.linalg.norm(fields["body_rates"][before]) > 1.0
-    assert np.linalg.norm(fields["velocity"][before]) > 0.1
-    # over 10 ms thrust, gravity and the moment of the load change velocities, a jerk would do more
-    np.testing.assert_allclose(fields["velocity"][after], fields["velocity"][before], atol=0.01 * 4.0)
-    np.testing.assert_allclose(fields["body_rates"][after], fields["body_rates"][before], atol=0.01 * 15.0)
+    before, middle, after = 49, 50, 51  # the drop is at 0.25 s, row 49
+    rates, velocity = fields["body_rates"], fields["velocity"]
+    assert np.linalg.norm(rates[before]) > 1.0
+    assert np.linalg.norm(velocity[before]) > 0.1
+    # from the very drop on it moves as the bare vehicle does; a jump of velocity would be an acceleration of 5 m/s^2
+    thrust, *torque = fields["wrench_applied"][middle]
+    up = fields["rot_body_to_world"][middle, 2::3]
+    acceleration = thrust / q450.MASS * up - [0.0, 0.0, G] - DAMPING * velocity[middle]
+    np.testing.assert_allclose((velocity[after] - velocity[before]) / 0.01, acceleration, rtol=0, atol=0.15)
+    spin = (torque - np.cross(rates[middle], q450.INERTIA * rates[middle])) / q450.INERTIA
+    np.testing.assert_allclose((rates[after] - rates[before]) / 0.01, spin, rtol=0, atol=0.15)
 
 
 @BOTH_KINDS
