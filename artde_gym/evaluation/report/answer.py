@@ -13,15 +13,15 @@ from artde_gym.tracking import Tracking
 FEW = 6  # seeds, below which an interval is itself uncertain
 
 
-def leader(result: Result, scenario: str, metric: str) -> str:
-    """The controller that falls least often; among those, the one with the smallest mean error."""
+def ranking(result: Result, scenario: str, metric: str) -> list[str]:
+    """Controllers by how often they fall; among those that fall as often, by their mean error."""
 
     def order(name: str) -> tuple[float, float]:
         _, rate = result.falls(scenario, name)
         error = statistics.mean(_walked(result, scenario, name, metric)).value
-        return (rate.value if rate.n else math.inf, math.inf if math.isnan(error) else error)
+        return rate.value, math.inf if math.isnan(error) else error
 
-    return min((name for name in result.controllers if len(result.rows(scenario, name))), key=order)
+    return sorted((name for name in result.controllers if len(result.rows(scenario, name))), key=order)
 
 
 def headline(result: Result, trackings: dict[str, Tracking]) -> str:
@@ -30,27 +30,25 @@ def headline(result: Result, trackings: dict[str, Tracking]) -> str:
         return f"{result.controllers[0]} was evaluated alone: there is nothing to compare it with."
     won: dict[str, list[str]] = {}
     for scenario in result.scenarios:
-        best = leader(result, scenario, _metric(trackings[scenario]))
+        best = ranking(result, scenario, _metric(trackings[scenario]))[0]
         won.setdefault("nobody" if _all_fall(result, scenario) else best, []).append(scenario)
     parts = [f"{name} in {', '.join(scenarios)}" for name, scenarios in sorted(won.items(), key=lambda x: -len(x[1]))]
     return f"Best, by falls first and RMS error second: {'; '.join(parts)}."
 
 
 def sentences(result: Result, scenario: str, tracking: Tracking) -> list[str]:
-    """What a scenario shows: the leader's falls and error, then how every other controller compares with it."""
+    """What a scenario shows: the leader's falls and error, then how the others compare with it, the closest first."""
     metric = _metric(tracking)
-    names = [name for name in result.controllers if len(result.rows(scenario, name))]
+    best, *rivals = names = ranking(result, scenario, metric)
     count = min(len(result.rows(scenario, name)) for name in names)
     care = [f"Only {count} seed{'s' if count != 1 else ''}: take the intervals with care."] if count < FEW else []
     if _all_fall(result, scenario):
         return ["Every controller fell in every episode.", *care]
-    best = leader(result, scenario, metric)
     text, digits = UNITS[tracking.errors[0].unit]
     falls, rate = result.falls(scenario, best)
     error = statistics.mean(_walked(result, scenario, best, metric))
     said = f"{best} leads: {_falls(falls, rate)}; RMS error {error.value:.{digits}f}{_span(error, digits)} {text}"
     said += " in the episodes without a fall" if falls else ""
-    rivals = [name for name in names if name != best]
     return [f"{said}.", *(_comparison(result, scenario, best, rival, metric) for rival in rivals), *care]
 
 
@@ -65,7 +63,8 @@ def _comparison(result: Result, scenario: str, best: str, rival: str, metric: st
         ours, others = result.pairs(scenario, best, rival, metric)
         wins = statistics.win_probability(ours, others)
         which, sign = ("smaller", 1) if gain.value >= 0 else ("larger", -1)
-        size = Estimate(sign * gain.value, *sorted((sign * gain.low, sign * gain.high)), gain.n)
+        low, high = sorted((sign * gain.low, sign * gain.high))
+        size = Estimate(sign * gain.value, low, high, gain.n)
         sure = "beyond chance at 95 %" if size.low > 0 else "undecided"
         parts.append(
             f"the RMS error of {best} is {size.value:.1f}{_span(size, 1)} % {which} on the {gain.n} shared "

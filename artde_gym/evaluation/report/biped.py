@@ -19,7 +19,7 @@ from artde_gym.robots.dynamics import RigidBodyTree
 from artde_gym.robots.ojas import ojas
 
 SHOWN = 10.0  # s of the walk, from its start
-SIDES: dict[str, Look] = {"left": OTHERS[0], "right": OTHERS[4]}
+SIDES: dict[str, Look] = {"left": OTHERS[3], "right": OTHERS[4]}
 BODY = {"centre of mass": OTHERS[2], **{f"{side} foot": look for side, look in SIDES.items()}}
 PERIOD = 0.001  # s, of the pattern in the environment
 
@@ -44,7 +44,9 @@ def reference(arguments: Mapping[str, Any]) -> list[str]:
     paths = {"centre of mass": com, "left foot": pattern.feet[part, 0], "right foot": pattern.feet[part, 1]}
     trajectories = {}
     for i, axis in enumerate("xyz"):
-        chart = _chart(f"Desired {axis} of centre of mass and feet", f"{axis} (m)", time, [p[:, i] for p in paths.values()])
+        chart = _chart(
+            f"Desired {axis} of centre of mass and feet", f"{axis} (m)", time, [p[:, i] for p in paths.values()]
+        )
         for name, path in paths.items():
             chart.line(time, path[:, i], BODY[name], text=name)
         trajectories[axis] = chart.svg()

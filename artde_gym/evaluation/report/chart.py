@@ -6,6 +6,7 @@ largest value in each of `COLUMNS` columns: no peak is lost, and a minute of sig
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from html import escape
@@ -113,7 +114,9 @@ class Chart:
         across, up = self._points(x, y)
         if len(across) > 2 * COLUMNS and kind != "path":
             across, up = _thinned(across, up)
-        self._parts.append(f'<path class="{kind}" style="--c:{look.colour}" d="{_path(across, up)}">{_title(text)}</path>')
+        self._parts.append(
+            f'<path class="{kind}" style="--c:{look.colour}" d="{_path(across, up)}">{_title(text)}</path>'
+        )
 
     def reference(self, x: ArrayLike, y: ArrayLike, text: str = "reference") -> None:
         """A dashed line in the page's own ink: what is meant to be followed."""
@@ -216,10 +219,9 @@ class Chart:
         return "".join(parts)
 
 
-def equal_axes(x: Axis, y: Axis, width: int) -> tuple[Axis, Axis, int]:
-    """The axes and a height at which a unit is as long on both."""
-    height = (width - LEFT - RIGHT) * (y.high - y.low) / (x.high - x.low)
-    return x, y, round(height) + TOP + BOTTOM
+def height_of(x: Axis, y: Axis, width: int) -> int:
+    """The height of a chart of this width in which a unit is as long on both axes."""
+    return round((width - LEFT - RIGHT) * (y.high - y.low) / (x.high - x.low)) + TOP + BOTTOM
 
 
 def _thinned(x: Array, y: Array) -> tuple[Array, Array]:
@@ -228,7 +230,7 @@ def _thinned(x: Array, y: Array) -> tuple[Array, Array]:
         return x, y
     edges = np.linspace(0, len(x), COLUMNS + 1).astype(int)
     kept = [0, len(x) - 1]
-    for first, last in zip(edges[:-1], edges[1:], strict=True):
+    for first, last in itertools.pairwise(edges.tolist()):
         part = y[first:last]
         if np.isfinite(part).any():
             kept += [first + int(np.nanargmin(part)), first + int(np.nanargmax(part))]

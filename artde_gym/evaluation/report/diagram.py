@@ -45,14 +45,14 @@ _CASCADE_WIRES = (
 
 def joint_loop() -> str:
     """One loop for all joints of the biped."""
-    return _svg("Block diagram: reference, law with adaptation, robot, and the estimate of one sample ago", 190, _JOINTS,
-                _JOINT_WIRES)  # fmt: skip
+    name = "Block diagram: reference, law with adaptation, robot, and the estimate of one sample ago"
+    return _svg(name, 190, _JOINTS, _JOINT_WIRES)
 
 
 def cascade() -> str:
     """Position loop outside, attitude loop inside, as the quadrotor has them."""
-    return _svg("Block diagram of the cascade: position loop, desired attitude, attitude loop, allocation, vehicle", 205,
-                _CASCADE, _CASCADE_WIRES)  # fmt: skip
+    name = "Block diagram of the cascade: position loop, desired attitude, attitude loop, allocation, vehicle"
+    return _svg(name, 205, _CASCADE, _CASCADE_WIRES)
 
 
 def _svg(name: str, height: int, blocks: tuple[Block, ...], wires: tuple[tuple[str, str, float, float], ...]) -> str:
@@ -66,12 +66,11 @@ def _svg(name: str, height: int, blocks: tuple[Block, ...], wires: tuple[tuple[s
     for left, top, width, lines in blocks:
         drawn.append(f'<rect class="block" x="{left}" y="{top}" width="{width}" height="{HEIGHT}" rx="4"/>')
         for i, line in enumerate(lines):
-            y = top + HEIGHT / 2 + 4 + 15 * (i - (len(lines) - 1) / 2)
+            x, y = left + width / 2, top + HEIGHT / 2 + 4 + 15 * (i - (len(lines) - 1) / 2)
             size = f' textLength="{width - 8}" lengthAdjust="spacingAndGlyphs"' if 5.6 * len(line) > width - 8 else ""
-            drawn.append(
-                f'<text class="block-text" x="{left + width / 2}" y="{y}" text-anchor="middle"{size}>{escape(line)}</text>'
-            )
+            drawn.append(f'<text class="block-text" x="{x}" y="{y}" text-anchor="middle"{size}>{escape(line)}</text>')
+    label = escape(name, quote=True)
     return (
-        f'<div class="chart diagram"><svg role="img" aria-label="{escape(name, quote=True)}" viewBox="0 0 420 {height}">'
+        f'<div class="chart diagram"><svg role="img" aria-label="{label}" viewBox="0 0 420 {height}">'
         f"<title>{escape(name)}</title>{''.join(drawn)}</svg></div>"
     )

@@ -8,7 +8,7 @@ import numpy as np
 
 from artde_gym.arrays import Array
 from artde_gym.evaluation.palette import looks
-from artde_gym.evaluation.report.chart import Axis, Chart, equal_axes
+from artde_gym.evaluation.report.chart import Axis, Chart, height_of
 from artde_gym.evaluation.report.html import figure
 from artde_gym.evaluation.report.run import Episode
 
@@ -28,8 +28,8 @@ def figures(episode: Episode) -> list[str]:
     charts = {"3D": _space(paths, wanted)}
     for plane, (i, j) in PLANES.items():
         everything = np.concatenate([wanted, *paths.values()])
-        axes = (Axis.of(f"{'xyz'[k]} (m)", everything[:, k]) for k in (i, j))
-        x, y, height = equal_axes(*axes, WIDTH)
+        x, y = (Axis.of(f"{'xyz'[k]} (m)", everything[:, k]) for k in (i, j))
+        height = height_of(x, y, WIDTH)
         chart = Chart(f"Flown and desired path in the {plane} plane", x, y, WIDTH, height)
         for name, path in paths.items():
             chart.line(path[:, i], path[:, j], shown[name], text=name, kind="path")
@@ -45,14 +45,17 @@ def _space(paths: dict[str, Array], wanted: Array) -> str:
     low[2] = 0.0
     corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (0.0, high[2])])
     seen = _seen(np.concatenate([corners, everything]))
-    x, y, height = equal_axes(Axis.of("", seen[:, 0]), Axis.of("", seen[:, 1]), WIDTH)
+    x, y = Axis.of("", seen[:, 0]), Axis.of("", seen[:, 1])
+    height = height_of(x, y, WIDTH)
     chart = Chart("Flown and desired path in three dimensions, with its shadow", x, y, WIDTH, height, frame=False)
 
     def segment(start: list[float], end: list[float]) -> None:
-        chart.guide(*_seen(np.array([start, end])).T)
+        x, y = _seen(np.array([start, end])).T
+        chart.guide(x, y)
 
     def label(point: list[float], text: str) -> None:
-        chart.text(*_seen(np.array([point]))[0].tolist(), text)
+        ((x, y),) = _seen(np.array([point]))
+        chart.text(x, y, text)
 
     for value in np.arange(low[0], high[0] + GRID / 2, GRID):
         segment([value, low[1], 0], [value, high[1], 0])
@@ -68,11 +71,14 @@ def _space(paths: dict[str, Array], wanted: Array) -> str:
     label([high[0] + 0.5, (low[1] + high[1]) / 2, 0], "y (m)")
     label([low[0] - 0.16, low[1], high[2] + 0.2], "z (m)")
     shadow = wanted * [1.0, 1.0, 0.0]
-    chart.guide(*_seen(shadow).T)
+    across, up = _seen(shadow).T
+    chart.guide(across, up)
     shown = looks(paths)
     for name, path in paths.items():
-        chart.line(*_seen(path).T, shown[name], text=name, kind="path")
-    chart.reference(*_seen(wanted).T)
+        across, up = _seen(path).T
+        chart.line(across, up, shown[name], text=name, kind="path")
+    across, up = _seen(wanted).T
+    chart.reference(across, up)
     return chart.svg()
 
 

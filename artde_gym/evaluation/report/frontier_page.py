@@ -46,8 +46,8 @@ def answer(found: Frontier) -> tuple[str, list[str]]:
     sign = 1 if axis.harder == "larger" else -1
     best = max(sign * row["frontier"] for row in known)
     first = [row["controller"] for row in known if sign * row["frontier"] == best]
-    head = f"{' and '.join(first)} {'stand' if len(first) > 1 else 'stands'} the most {axis.path}: "
-    head += value_text(next(row for row in known if row["controller"] == first[0]), axis.unit)
+    reach = value_text(next(row for row in known if row["controller"] == first[0]), axis.unit)
+    head = f"{' and '.join(first)} {'go' if len(first) > 1 else 'goes'} farthest in {axis.path}: {reach}"
     others = [f"{row['controller']} {value_text(row, axis.unit)}" for row in rows if row["controller"] not in first]
     return head + (f" ({'; '.join(others)})." if others else "."), lines
 
@@ -61,12 +61,14 @@ def parts(found: Frontier) -> list[str]:
     chart.level(100 * found.survival, f"wanted: {100 * found.survival:g} %")
     for i, (name, look) in enumerate(shown.items()):
         rows = [row for row in _records(found.levels) if row["controller"] == name]
-        shift = (i - (len(shown) - 1) / 2) * 0.008 * (axis.high - axis.low)
+        shift = (i - (len(shown) - 1) / 2) * 0.012 * (axis.high - axis.low)
         places = [row["value"] + shift for row in rows]
         chart.line(places, [100 * row["rate"] for row in rows], look, text=name, kind="path")
         for place, row in zip(places, rows, strict=True):
             chart.interval(place, 100 * row["low"], 100 * row["high"], look)
-            chart.marker(place, 100 * row["rate"], look, f"{name} at {row['value']:g}: {row['survived']}/{row['episodes']}")
+            chart.marker(
+                place, 100 * row["rate"], look, f"{name} at {row['value']:g}: {row['survived']}/{row['episodes']}"
+            )
     caption = "Survival with 95 % intervals (Wilson); markers side by side are one level."
     lines = [
         [Cell(f"{row['value']:g}", row["value"]), row["controller"], Cell(f"{row['survived']} of {row['episodes']}",

@@ -34,15 +34,18 @@ def page(title: str, body: Iterable[str]) -> str:
     )
 
 
-def section(title: str, *parts: str, level: int = 2) -> str:
-    return f"<section>\n<h{level}>{escape(title)}</h{level}>\n" + "\n".join(part for part in parts if part) + "\n</section>"
+def section(title: str, *parts: str) -> str:
+    """Parts under a head; empty ones are left out."""
+    return f"<section>\n<h2>{escape(title)}</h2>\n" + "\n".join(part for part in parts if part) + "\n</section>"
 
 
 def paragraph(text: str, kind: str = "") -> str:
+    """Words; the kind is a class of the style sheet."""
     return f"<p{_kind(kind)}>{escape(text)}</p>"
 
 
 def bullets(texts: Iterable[str]) -> str:
+    """Sentences one below the other."""
     return "<ul>" + "".join(f"<li>{escape(text)}</li>" for text in texts) + "</ul>"
 
 
@@ -54,7 +57,9 @@ def details(summary: str, *parts: str) -> str:
 def table(caption: str, columns: Sequence[str], rows: Iterable[Sequence[str | Cell]]) -> str:
     """A table that sorts by the column whose head is pressed; the first cell of a row is its head."""
     rows = list(rows)
-    kinds = [_kind("text" if isinstance(cell, Cell) and cell.kind == "text" else "") for cell in rows[0]] if rows else []
+    kinds = (
+        [_kind("text" if isinstance(cell, Cell) and cell.kind == "text" else "") for cell in rows[0]] if rows else []
+    )
     heads = zip(columns, kinds or [""] * len(columns), strict=True)
     head = "".join(
         f'<th scope="col"{kind}><button type="button">{escape(column)}</button></th>' for column, kind in heads
@@ -65,8 +70,8 @@ def table(caption: str, columns: Sequence[str], rows: Iterable[Sequence[str | Ce
         lines.append(f"<tr>{_cell(first, 'th')}{cells}</tr>")
     name = escape(caption, quote=True)
     return (
-        f'<div class="scroll" role="region" aria-label="{name}" tabindex="0"><table><caption>{escape(caption)}</caption>'
-        f"<thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table></div>"
+        f'<div class="scroll" role="region" aria-label="{name}" tabindex="0"><table>'
+        f"<caption>{escape(caption)}</caption><thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table></div>"
     )
 
 
@@ -77,17 +82,15 @@ def figure(caption: str, charts: Mapping[str, str], legend: Mapping[str, Look] |
     )
     keys = "".join(_key(name, look) for name, look in (legend or {}).items())
     return (
-        f'<figure><figcaption>{escape(caption)}</figcaption>{f"<p class=legend>{keys}</p>" if keys else ""}'
+        f"<figure><figcaption>{escape(caption)}</figcaption>{f'<p class=legend>{keys}</p>' if keys else ''}"
         f'<div class="charts">{drawn}</div></figure>'
     )
 
 
 def _key(name: str, look: Look) -> str:
-    shape = SHAPES.get(look.marker, SHAPES["o"])
-    return (
-        f'<span class="key"><svg aria-hidden="true" viewBox="-14 -7 28 14"><path class="line" style="--c:{look.colour}" '
-        f'd="M-14 0H14"/><path class="marker" style="--c:{look.colour}" d="{shape}"/></svg>{escape(name)}</span>'
-    )
+    style, shape = f'style="--c:{look.colour}"', SHAPES.get(look.marker, SHAPES["o"])
+    drawn = f'<path class="line" {style} d="M-14 0H14"/><path class="marker" {style} d="{shape}"/>'
+    return f'<span class="key"><svg aria-hidden="true" viewBox="-14 -7 28 14">{drawn}</svg>{escape(name)}</span>'
 
 
 def _cell(cell: str | Cell, tag: str) -> str:

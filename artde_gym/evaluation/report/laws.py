@@ -100,7 +100,7 @@ class Laws:
             for column in values.T:
                 chart.line(time, column, OTHERS[2])
             chart.level(2.0, "limit: 2")
-            verdict = "inside (0, 2)" if 0 < values.min() and values.max() < 2 else "outside (0, 2): it may diverge"
+            verdict = "inside (0, 2)" if values.min() > 0 and values.max() < 2 else "outside (0, 2): it may diverge"
             charts[f"{title}; {values.min():.3f} to {values.max():.3f}, {verdict}"] = chart.svg()
         caption = (
             "Time-delay estimation converges where every eigenvalue of M^-1 m_bar lies in (0, 2). M is the joint-space "
@@ -116,7 +116,7 @@ class Laws:
             values = np.asarray(m_bar) / (inertia if gain.endswith("_q") else mass)
             low, high = float(np.min(values)), float(np.max(values))
             loop = "attitude" if gain.endswith("_q") else "position"
-            inside = 0 < low and high < 2
+            inside = low > 0 and high < 2
             rows.append([
                 loop, Cell(", ".join(names), kind="text"), _text(m_bar), f"{low:.3f} to {high:.3f}",
                 Cell("inside (0, 2)" if inside else "outside (0, 2)", kind="holds" if inside else "fails"),

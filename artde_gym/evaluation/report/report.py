@@ -24,12 +24,11 @@ NAME = "report.html"
 _LAST = ("Reference and loop", "Provenance")
 
 
-def write_report(folder: str | Path, *, pictures: bool = False) -> Path:
+def write_report(folder: str | Path) -> Path:
     """Write the report of an evaluation or a frontier into its folder; a run that was interrupted has one, too.
 
     Args:
         folder: what `evaluate` or `frontier` wrote.
-        pictures: whether to run one episode of each controller again for snapshots; takes as long as those episodes.
 
     Returns:
         The file.
@@ -40,12 +39,12 @@ def write_report(folder: str | Path, *, pictures: bool = False) -> Path:
     folder = Path(folder)
     if not folder.is_dir():
         raise StoreError("results folder", str(folder), "a folder that `evaluate` or `frontier` wrote")
-    text = _frontier(folder) if (folder / RECORD).exists() else _evaluation(Run.read(folder), pictures)
+    text = _frontier(folder) if (folder / RECORD).exists() else _evaluation(Run.read(folder))
     write_atomically(folder / NAME, lambda file: file.write(text.encode()))
     return folder / NAME
 
 
-def _evaluation(run: Run, pictures: bool) -> str:
+def _evaluation(run: Run) -> str:
     result = run.result
     if not len(result.episodes):
         return page("artde-gym report", ["<h1>No episode was finished yet</h1>", _origin(run.record)])
@@ -53,7 +52,7 @@ def _evaluation(run: Run, pictures: bool) -> str:
     said = {scenario: sentences(result, scenario, trackings[scenario]) for scenario in result.scenarios}
     title = f"{', '.join(result.controllers)} in {', '.join(result.scenarios)}"
     lone = len(said) == 1
-    short = said if lone else {scenario: lines[:1] for scenario, lines in said.items()}
+    short = said if lone else {scenario: lines[:2] for scenario, lines in said.items()}
     body = [f"<h1>{escape(title)}</h1>", _answer(headline(result, trackings), short)]
     if not result.complete:
         body.append(paragraph("Interrupted or still running: this holds the episodes that were finished."))
@@ -61,8 +60,7 @@ def _evaluation(run: Run, pictures: bool) -> str:
     if run.claims is not None:
         body.append(_anchored("Claims", tables.claims(run.claims)))
     laws = Laws(run)
-    for scenario in result.scenarios:
-        body.append(_scenario(run, laws, scenario, [] if lone else said[scenario], pictures))
+    body += [_scenario(run, laws, name, [] if lone else lines) for name, lines in said.items()]
     body += [_anchored("Reference and loop", *_plants(run)), _anchored("Provenance", _origin(run.record))]
     return page(f"artde-gym: {title}", body)
 
@@ -83,7 +81,7 @@ def _plants(run: Run) -> list[str]:
     return [part for several in parts.values() for part in several]
 
 
-def _scenario(run: Run, laws: Laws, scenario: str, said: list[str], pictures: bool) -> str:
+def _scenario(run: Run, laws: Laws, scenario: str, said: list[str]) -> str:
     entry, cell = SCENARIOS.get(scenario), run.cell(scenario)
     parts = [paragraph(f"{cell['env_id']}: {entry.text}." if entry else f"{cell['env_id']}.", "soft")]
     parts += [bullets(said) if said else "", tables.falls(run, scenario)]
@@ -95,10 +93,6 @@ def _scenario(run: Run, laws: Laws, scenario: str, said: list[str], pictures: bo
         parts.append(paragraph("No signals were stored for this scenario, so there are no plots over time.", "soft"))
     else:
         parts += _episode(run, laws, scenario, episode)
-    if pictures:
-        from artde_gym.evaluation.report.pictures import strips  # drives environments: only when asked for
-
-        parts += strips(run, scenario)
     return _anchored(scenario, *parts)
 
 
@@ -163,6 +157,6 @@ def _origin(record: Mapping[str, Any]) -> str:
     whole = escape(json.dumps(record["configuration"], indent=1))
     return (
         f"<dl>{rows}</dl><details><summary>Full configuration</summary>"
-        f'<div class="scroll" role="region" aria-label="Full configuration" tabindex="0"><pre><code>{whole}</code></pre>'
-        "</div></details>"
+        '<div class="scroll" role="region" aria-label="Full configuration" tabindex="0">'
+        f"<pre><code>{whole}</code></pre></div></details>"
     )

@@ -174,7 +174,9 @@ def _digits(metric: str) -> int:
 def _text(estimate: Estimate, digits: int, sign: str = "") -> str:
     if not estimate.n:
         return ""
-    span = f" ({estimate.low:{sign}.{digits}f}..{estimate.high:{sign}.{digits}f})" if math.isfinite(estimate.low) else ""
+    span = (
+        f" ({estimate.low:{sign}.{digits}f}..{estimate.high:{sign}.{digits}f})" if math.isfinite(estimate.low) else ""
+    )
     return f"{estimate.value:{sign}.{digits}f}{span}"
 
 
