@@ -7,6 +7,7 @@ make benchmark ARGS="--steps 1000000"       memory over a million steps too, som
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import itertools
 import json
 import statistics
@@ -26,6 +27,7 @@ WALK = 5900  # steps: two seconds of standing, two steps, standing again
 TURN = 50  # steps
 FLIGHT = 2000  # control periods
 RESETS = 200
+MUJOCO = importlib.util.find_spec("mujoco") is not None  # an extra: its figures are left out without it
 
 
 def main() -> None:
@@ -140,13 +142,19 @@ def walking() -> dict[str, float]:
     tde, artde = (ClosedLoop(name, make()) for name in ("tde", "artde"))
     environment, bare = Replay(artde, make()), BareWalk(artde, make())
     variants = {"tde": tde.turn, "artde": artde.turn, "environment": environment.turn, "bare": bare.turn}
+    if MUJOCO:
+        variants["artde, mujoco"] = ClosedLoop("artde", make(engine="mujoco")).turn
     times = in_turns(variants, WALK // TURN)
-    return {
+    figures = {
         "bare engine (us a step)": 1e6 * times["bare"] / TURN,
         "env.step / bare engine (rate, >= 0.85)": times["bare"] / times["environment"],
         "closed loop TDE / bare engine (rate)": times["bare"] / times["tde"],
         "closed loop ARTDE / bare engine (>= 0.75)": times["bare"] / times["artde"],
     }
+    if MUJOCO:
+        figures["closed loop ARTDE in MuJoCo (us a step)"] = 1e6 * times["artde, mujoco"] / TURN
+        figures["the same / in Bullet (rate, >= 3)"] = times["artde"] / times["artde, mujoco"]
+    return figures
 
 
 def flying() -> dict[str, float]:

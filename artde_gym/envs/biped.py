@@ -140,7 +140,7 @@ The robot stands on both feet in the pattern's first pose, at rest, in balance w
 | `step_duration` | 1.0 | 0.6 to 2 s | time of one step |
 | `duration` | 58.0 | from 0.1 s | length of the walk |
 | `observe_ground_force` | False | False, True | append the ground's force on each foot to the observation |
-| `engine` | "bullet" | "bullet" | physics engine |
+| `engine` | "bullet" | "bullet", "mujoco" | physics engine; see docs/engines.md |
 
 `reset(options={{"disturbances": ..., "scenario": "S2"}})` replaces the disturbances of this and the following
 episodes, by a mapping or by those of a named scenario.
@@ -200,7 +200,7 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         self._disturbances = self._parse(self.default_disturbances if disturbances is None else disturbances)
         self._substeps = steps_per_period(control_period, TIME_STEP)
         self.control_period = self._substeps * TIME_STEP
-        self._engine: Engine = make_engine(engine, model, TIME_STEP)
+        self._engine: Engine = make_engine(engine, model, TIME_STEP, renders=render_mode is not None)
         self.pattern = walking_pattern(speed, step_duration, duration, TIME_STEP)
         self._plan = _plan(self.pattern, self._substeps)
         self._last = len(self._plan) - 1

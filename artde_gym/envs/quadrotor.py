@@ -27,6 +27,7 @@ from artde_gym.robots import q450 as robot
 from artde_gym.robots.spec import Vector
 from artde_gym.sim.engine import Camera, Engine
 from artde_gym.sim.factory import EngineName, make_engine
+from artde_gym.sim.rotation import matrix
 
 TIME_STEP = 0.001  # s, of the physics
 STEPS = 5  # physics steps from one grid point to the next
@@ -45,7 +46,7 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
     `vectorization_mode="vector_entry_point"` gives thousands of the same in NumPy (`artde_gym.envs.quadrotor_batch`).
 
     {shared}
-    | `engine` | "bullet" | "bullet" | physics engine |
+    | `engine` | "bullet" | "bullet", "mujoco" | physics engine; see docs/engines.md |
 
     `reset(options={{"disturbances": ..., "scenario": "Q1"}})` replaces the disturbances of this and the following
     episodes, by a mapping or by those of a named scenario.
@@ -94,7 +95,7 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         self.observation_space = task.OBSERVATION.box()
         self.action_space = task.ACTION.box()
         self._low, self._high = self.action_space.low, self.action_space.high
-        self._engine: Engine = make_engine(engine, self.nominal_robot, TIME_STEP)
+        self._engine: Engine = make_engine(engine, self.nominal_robot, TIME_STEP, renders=render_mode is not None)
         self._engine.place(START, _NO_JOINTS)
         self._placed = self._engine.snapshot()
         self._over = True  # no step before the first reset
@@ -198,7 +199,7 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
 
     def _read(self) -> None:
         self._state = self._engine.read()
-        self._rot = _rotation(self._state.quat_xyzw)
+        self._rot = matrix(self._state.quat_xyzw)
 
     def _drag(self) -> Vector:
         """Force of the air until the next grid point (N), body axes."""
@@ -241,12 +242,3 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
     def _falls(self) -> tuple[bool, bool, bool]:
         spin = math.hypot(*self._state.angular_velocity) ** 2
         return task.falls(self._state.position, self._rot[8], spin)
-
-
-def _rotation(quat_xyzw: tuple[float, float, float, float]) -> tuple[float, ...]:
-    """The rotation matrix, row by row."""
-    x, y, z, w = quat_xyzw
-    x2, y2, z2 = x + x, y + y, z + z
-    xx, yy, zz, xy, xz, yz = x * x2, y * y2, z * z2, x * y2, x * z2, y * z2
-    wx, wy, wz = w * x2, w * y2, w * z2
-    return 1 - yy - zz, xy - wz, xz + wy, xy + wz, 1 - xx - zz, yz - wx, xz - wy, yz + wx, 1 - xx - yy

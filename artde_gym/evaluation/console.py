@@ -81,10 +81,7 @@ class _Tables:
         tracking = tracking_of(pd.concat(rows)["env"].iloc[0])
         for metric, what, axes in measured(tracking, () if entry is None else entry.phases):
             parts += self._metric(scenario, reference, metric, what, axes)
-        events = [name.removeprefix("recovery_time_s_") for name in self._result.metrics if "recovery_time" in name]
-        if events:
-            parts.append(self._events(scenario, tracking, events))
-        return Group(*parts)
+        return Group(*parts, *self._events(scenario, tracking))
 
     def _falls(self, scenario: str, reference: str | None) -> Table:
         table = _table("controller", "falls", "rate", "95 %", "time to fall (s)", "thesis (s)", title="Falls")
@@ -138,22 +135,23 @@ class _Tables:
         pairs = [self._rivals[i : i + TOGETHER] for i in range(0, len(self._rivals), TOGETHER)]
         return [table(self._controllers, []), *(table([], pair) for pair in pairs)]
 
-    def _events(self, scenario: str, tracking: Tracking, events: list[str]) -> Table:
+    def _events(self, scenario: str, tracking: Tracking) -> list[Table]:
         """Peak and recovery after each disturbance; a recovery that never came counts beside the mean of the others."""
         unit, (text, digits) = tracking.errors[0].unit, UNITS[tracking.errors[0].unit]
         table = _table("after", "", title="after disturbances")
         table.collapse_padding = len(self._controllers) > WIDE
         for controller in self._controllers:
             table.add_column(controller, justify="right")
-        for event in events:
-            peaks = [self._means[scenario, name, f"peak_error_{unit}_{event}"] for name in self._controllers]
+        prefix = f"peak_error_{unit}_"
+        for event in (name.removeprefix(prefix) for name in self._result.metrics if name.startswith(prefix)):
+            peaks = [self._means[scenario, name, prefix + event] for name in self._controllers]
             if not any(map(math.isfinite, peaks)):
                 continue
             table.add_row(event, f"peak ({text})", *(f"{peak:.{digits}f}" for peak in peaks))
             column = f"recovery_time_s_{event}"
             times = [self._result.values(scenario, name, column) for name in self._controllers]
             table.add_row("", "recovery (s)", *map(_recovery, times))
-        return table
+        return [table] if table.row_count else []
 
 
 def measured(tracking: Tracking, phases: Sequence[tuple[float, float]]) -> list[tuple[str, str, list[str]]]:

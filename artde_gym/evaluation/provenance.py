@@ -10,7 +10,9 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-PACKAGES = ("artde-gym", "gymnasium", "numpy", "scipy", "pandas", "pybullet", "optuna", "torch", "stable-baselines3")
+PACKAGES = (
+    "artde-gym", "gymnasium", "numpy", "scipy", "pandas", "pybullet", "mujoco", "optuna", "torch", "stable-baselines3",
+)  # fmt: skip
 
 
 def provenance() -> dict[str, Any]:

@@ -23,9 +23,9 @@ def urdf(spec: RobotSpec) -> str:
 def _link(link: Link) -> ET.Element:
     element = ET.Element("link", name=link.name)
     inertial = ET.SubElement(element, "inertial")
-    ET.SubElement(inertial, "origin", xyz=_numbers(link.com), rpy="0 0 0")
-    ET.SubElement(inertial, "mass", value=_numbers([link.mass]))
-    ixx, iyy, izz = (_numbers([value]) for value in link.inertia)
+    ET.SubElement(inertial, "origin", xyz=numbers(link.com), rpy="0 0 0")
+    ET.SubElement(inertial, "mass", value=numbers([link.mass]))
+    ixx, iyy, izz = (numbers([value]) for value in link.inertia)
     ET.SubElement(inertial, "inertia", ixx=ixx, iyy=iyy, izz=izz, ixy="0", ixz="0", iyz="0")
     for tag, shapes in (("visual", link.visuals), ("collision", link.collisions)):
         for index, box in enumerate(shapes):
@@ -35,12 +35,12 @@ def _link(link: Link) -> ET.Element:
 
 def _shape(tag: str, box: Box, name: str) -> ET.Element:
     element = ET.Element(tag)
-    ET.SubElement(element, "origin", xyz=_numbers(box.center), rpy="0 0 0")
+    ET.SubElement(element, "origin", xyz=numbers(box.center), rpy="0 0 0")
     geometry = ET.SubElement(element, "geometry")
-    ET.SubElement(geometry, "box", size=_numbers(box.size))
+    ET.SubElement(geometry, "box", size=numbers(box.size))
     if tag == "visual":
         material = ET.SubElement(element, "material", name=name)
-        ET.SubElement(material, "color", rgba=_numbers(box.colour))
+        ET.SubElement(material, "color", rgba=numbers(box.colour))
     return element
 
 
@@ -49,12 +49,13 @@ def _joint(link: Link, effort: float) -> ET.Element:
     element = ET.Element("joint", name=link.name, type=kind)
     ET.SubElement(element, "parent", link=str(link.parent))
     ET.SubElement(element, "child", link=link.name)
-    ET.SubElement(element, "origin", xyz=_numbers(link.origin), rpy="0 0 0")
+    ET.SubElement(element, "origin", xyz=numbers(link.origin), rpy="0 0 0")
     if link.axis is not None:
-        ET.SubElement(element, "axis", xyz=_numbers(link.axis))
-        ET.SubElement(element, "limit", effort=_numbers([effort]), velocity="1000")
+        ET.SubElement(element, "axis", xyz=numbers(link.axis))
+        ET.SubElement(element, "limit", effort=numbers([effort]), velocity="1000")
     return element
 
 
-def _numbers(values: Iterable[float]) -> str:
+def numbers(values: Iterable[float]) -> str:
+    """Numbers as an XML attribute, with all their digits."""
     return " ".join(f"{value:.17g}" for value in values)

@@ -26,7 +26,8 @@ from artde_gym.arrays import Array
 from artde_gym.errors import RobotError
 from artde_gym.robots.spec import RobotSpec, Vector
 from artde_gym.robots.urdf import urdf
-from artde_gym.sim.engine import PAYLOAD_RADIUS, Camera, State
+from artde_gym.sim.engine import PAYLOAD_COLOUR, PAYLOAD_RADIUS, Camera, State
+from artde_gym.sim.rotation import Quaternion, moved, rotated
 
 
 @contextlib.contextmanager
@@ -48,7 +49,6 @@ GEAR_ITERATIONS = 30  # of the constraint solver; gears converge faster than bar
 BARE_ITERATIONS = 50
 GEAR_FORCE = 1e6  # N, more than any gear carries
 PAYLOAD_FORCE = 1e5  # N, likewise
-PAYLOAD_COLOUR = (0.85, 0.45, 0.1, 1.0)
 HOLD_TORQUE = 100.0  # Nm, of the motors that hold joints which nobody actuates
 
 _ORIGIN = (0.0, 0.0, 0.0)
@@ -80,7 +80,8 @@ class BulletEngine:
         self._ball = bullet.createVisualShape(  # once: Bullet never frees a visual shape
             bullet.GEOM_SPHERE, radius=PAYLOAD_RADIUS, rgbaColor=PAYLOAD_COLOUR, physicsClientId=self._client
         )
-        self._com = spec.base.com
+        self._com = x, y, z = spec.base.com
+        self._to_origin = (-x, -y, -z)  # of the base, from its centre of mass
         self._mass_factor = 1.0
         self._friction = math.nan
         self._friction_at: dict[int, float] = {}  # of the contacts in each snapshot
@@ -168,18 +169,12 @@ class BulletEngine:
         velocity, spin = bullet.getBaseVelocity(self._robot, physicsClientId=client)
         if not self._joints and not any(self._com):
             return State(_NO_JOINTS, _NO_JOINTS, center, quat, velocity, spin)
-        states = bullet.getJointStates(self._robot, self._joints, physicsClientId=client)
+        states = bullet.getJointStates(self._robot, self._joints, physicsClientId=client) if self._joints else ()
         n = len(states)
         joints = np.array([state[0] for state in states] + [state[1] for state in states])  # one array is faster
-        arm = self._arm(quat)
-        return State(
-            joints[:n],
-            joints[n:],
-            (center[0] - arm[0], center[1] - arm[1], center[2] - arm[2]),
-            quat,
-            _velocity_of_origin(velocity, spin, arm),
-            spin,
-        )
+        x, y, z = arm = rotated(self._to_origin, quat)
+        position = (center[0] + x, center[1] + y, center[2] + z)
+        return State(joints[:n], joints[n:], position, quat, moved(velocity, spin, arm), spin)
 
     def step(self, tau: Array) -> None:
         if self._joints:
@@ -315,14 +310,7 @@ class BulletEngine:
     def close(self) -> None:
         self._finalizer()
 
-    def _arm(self, quat: tuple[float, float, float, float]) -> tuple[float, float, float]:
-        """Base origin to base centre of mass, in world axes; plain floats, since this runs every step."""
-        x, y, z, w = quat
-        cx, cy, cz = self._com
-        tx, ty, tz = 2 * (y * cz - z * cy), 2 * (z * cx - x * cz), 2 * (x * cy - y * cx)
-        return cx + w * tx + y * tz - z * ty, cy + w * ty + z * tx - x * tz, cz + w * tz + x * ty - y * tx
-
-    def _link_frame(self, link: str) -> tuple[Vector, tuple[float, float, float, float]]:
+    def _link_frame(self, link: str) -> tuple[Vector, Quaternion]:
         index = self._links[link]
         if index < 0:
             state = self.read()
@@ -331,13 +319,7 @@ class BulletEngine:
         return state[4], state[5]
 
 
-def _velocity_of_origin(velocity: Vector, spin: Vector, arm: Vector) -> Vector:
-    """v_origin = v_com - w x arm, in plain floats, since this runs every step."""
-    (vx, vy, vz), (wx, wy, wz), (ax, ay, az) = velocity, spin, arm
-    return vx - wy * az + wz * ay, vy - wz * ax + wx * az, vz - wx * ay + wy * ax
-
-
-def _rotation(quat_xyzw: tuple[float, float, float, float]) -> Array:
+def _rotation(quat_xyzw: Quaternion) -> Array:
     return np.array(bullet.getMatrixFromQuaternion(quat_xyzw)).reshape(3, 3)
 
 

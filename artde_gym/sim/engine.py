@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
 from artde_gym.robots.spec import RobotSpec, Vector
+from artde_gym.sim.rotation import Quaternion
 
 PAYLOAD_RADIUS = 0.08  # m, of the homogeneous ball
 
@@ -22,7 +23,7 @@ class State(NamedTuple):
     q: Array
     qd: Array
     position: Vector
-    quat_xyzw: tuple[float, float, float, float]
+    quat_xyzw: Quaternion
     velocity: Vector
     angular_velocity: Vector
 
@@ -38,29 +39,43 @@ class Camera(NamedTuple):
     height: int = 480
 
 
-class Engine(Protocol):
-    """One robot on flat, level ground. Joints that the spec does not actuate are held at zero.
+PAYLOAD_RADIUS = 0.08  # m, of the homogeneous ball that is the payload; it shows on either side of Ojas' torso
+PAYLOAD_COLOUR = (0.85, 0.45, 0.1, 1.0)
 
-    Ground friction is the coefficient of the *pair* foot and ground, whatever the engine's rule of combination.
+
+class Engine(Protocol):
+    """One robot on flat, level ground, which only the spec's collision shapes touch; its parts pass through each other.
+
+    Joints that the spec does not actuate are held at zero. Gravity and masses stay as they were set, whatever is placed
+    or restored afterwards; they start at 9.81 m/s^2 downward and at the spec's. Friction has no default: set it.
     """
 
     spec: RobotSpec
     time_step: float
 
     def place(self, position: Vector, q: Array) -> None:
-        """Put the upright robot with its base origin at `position` (m) and the joints at `q`, all at rest."""
+        """Put the upright robot with its base origin at `position` (m) and the joints at `q`, all at rest.
+
+        A payload is gone. The ground is felt from the next step on.
+        """
         ...
 
     def snapshot(self) -> int:
-        """Remember the whole state, contacts and solver memory included; returns a handle."""
+        """Remember the whole state of a robot without a payload; returns a handle.
+
+        That is what `read`, `foot_loads` and `ground_forces` say, what the solver remembers, and the friction.
+        """
         ...
 
     def restore(self, snapshot: int) -> None:
-        """Return to a snapshot, bit for bit; a payload attached since is gone."""
+        """Return to a snapshot, bit for bit; a payload attached since is gone.
+
+        Forces must not be pending: whether a push that no step has taken up yet survives is up to the engine.
+        """
         ...
 
     def read(self) -> State:
-        """The state now."""
+        """The state now: after the last step, or as placed or restored. Later steps do not change what was read."""
         ...
 
     def step(self, tau: Array) -> None:
@@ -70,16 +85,20 @@ class Engine(Protocol):
     def push_base(self, force: Vector, torque: Vector, *, body_axes: bool) -> None:
         """Add a force (N) at the base link's centre of mass and a torque (Nm), for the next step only.
 
-        Both along the base's own axes or along the world's.
+        Both along the base's own axes, as they are now, or along the world's. Without the payload's mass.
         """
         ...
 
     def push(self, site: str, force: Vector) -> None:
-        """Add a force (N, world axes) at a named site of the spec, for the next step only."""
+        """Add a force (N, world axes) at a named site of the spec, where it is now, for the next step only.
+
+        Raises:
+            RobotError: for a site that the spec does not have.
+        """
         ...
 
     def foot_loads(self) -> tuple[float, ...]:
-        """Normal force of the ground on each foot during the last step (N)."""
+        """Normal force of the ground on each foot during the last step (N): z of `ground_forces`, and cheaper."""
         ...
 
     def ground_forces(self) -> Array:
@@ -87,7 +106,10 @@ class Engine(Protocol):
         ...
 
     def set_friction(self, coefficient: float) -> None:
-        """Set the friction coefficient of feet and ground."""
+        """Set the coefficient of Coulomb friction of the pair foot and ground, from the next step on.
+
+        Of the *pair*: whatever rule the engine has to combine coefficients of two bodies.
+        """
         ...
 
     def set_gravity(self, gravity: Vector) -> None:
@@ -95,13 +117,14 @@ class Engine(Protocol):
         ...
 
     def scale_masses(self, factor: float) -> None:
-        """Set mass and inertia of every link to so many times the spec's."""
+        """Set mass and inertia of every link, and armature, to so many times the spec's; a payload keeps its own."""
         ...
 
     def attach_payload(self, mass: float, position: Vector) -> None:
         """Fix a ball of `mass` (kg) and `PAYLOAD_RADIUS` to the base link, its centre at `position` in its frame (m).
 
-        It takes over the base's motion, and falls freely once released.
+        It takes over the base's motion, touches nothing, and falls freely, also through the ground, once released. A
+        former payload is gone.
         """
         ...
 
@@ -110,7 +133,11 @@ class Engine(Protocol):
         ...
 
     def render(self, camera: Camera) -> NDArray[np.uint8]:
-        """A picture, (height, width, 3)."""
+        """A picture, (height, width, 3); it changes nothing.
+
+        Raises:
+            OptionError: where the engine cannot draw on this machine.
+        """
         ...
 
     def close(self) -> None:

@@ -142,17 +142,17 @@ class RigidBodies:
 
 def times(matrices: Array, vectors: Array) -> Array:
     """Matrices (3, 3, ...) times vectors (3, ...), body by body; the order of the sum is fixed."""
-    products = matrices * vectors
-    out = products[:, 0] + products[:, 1]
-    out += products[:, 2]
+    out = matrices[:, 0] * vectors[0]
+    out += matrices[:, 1] * vectors[1]
+    out += matrices[:, 2] * vectors[2]
     return out
 
 
 def transposed_times(matrices: Array, vectors: Array) -> Array:
     """Transposed matrices (3, 3, ...) times vectors (3, ...), likewise."""
-    products = matrices * vectors[:, None]
-    out = products[0] + products[1]
-    out += products[2]
+    out = matrices[0] * vectors[0]
+    out += matrices[1] * vectors[1]
+    out += matrices[2] * vectors[2]
     return out
 
 

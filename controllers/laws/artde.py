@@ -78,19 +78,20 @@ class ArtdeGains(TdeGains):
 
 
 class ArtdeMemory(NamedTuple):
-    """TDE's memory, the sliding variable s (..., n), and the gains for the next sample (...)."""
+    """TDE's memory, the sliding variable s (..., n), the gains for the next sample (...), and c for those who look."""
 
     tde: TdeMemory
     s: Array
     beta_0: Array
     beta_1: Array
+    c: Array
 
 
 def artde_start(gains: ArtdeGains, signals: Signals, period: float) -> ArtdeMemory:
     """Memory before the first sample, as if s had been the same just before."""
     s = sliding_variable(*errors(signals), gains.k_p, gains.k_d)
     beta = np.full(s.shape[:-1], gains.beta_start, dtype=s.dtype)
-    return ArtdeMemory(tde_start(signals, period), s, beta, beta)
+    return ArtdeMemory(tde_start(signals, period), s, beta, beta, beta)
 
 
 def artde(
@@ -105,7 +106,7 @@ def artde(
     robust = (gains.alpha * c / np.sqrt(s_squared + gains.eps))[..., None] * s
     u = desired_acceleration(signals, e, ed, gains.k_p, gains.k_d) + robust
     tau, memory_tde = time_delay(gains.m_bar, memory.tde, signals, u if du is None else u + du, period)
-    return tau, ArtdeMemory(memory_tde, s, *_adapt(gains, memory, s, s_squared, xi, period))
+    return tau, ArtdeMemory(memory_tde, s, *_adapt(gains, memory, s, s_squared, xi, period), c)
 
 
 def _adapt(

@@ -1,4 +1,4 @@
-"""Pinocchio as the independent judge of robots and walks."""
+"""Pinocchio as the independent judge of robots and walks, and the engines to be judged."""
 
 from typing import Any
 
@@ -6,8 +6,11 @@ import numpy as np
 import pinocchio
 import pytest
 
+from artde_gym.errors import OptionError
+from artde_gym.robots.ojas import ojas
 from artde_gym.robots.spec import RobotSpec
 from artde_gym.robots.urdf import urdf
+from artde_gym.sim.factory import EngineName, make_engine
 
 pin: Any = pinocchio  # compiled, without type information
 
@@ -97,6 +100,23 @@ class Judge:
 def judge():
     """Turns a spec into its judge."""
     return Judge
+
+
+@pytest.fixture(params=["bullet", "mujoco"])
+def engine_name(request: pytest.FixtureRequest) -> EngineName:
+    """Each engine in turn: what is physics must hold in both."""
+    return request.param
+
+
+@pytest.fixture
+def drawing_engine(engine_name: EngineName) -> EngineName:
+    """Each engine that can draw on this machine."""
+    if engine_name == "mujoco":
+        try:
+            make_engine("mujoco", ojas(), 0.001, renders=True).close()
+        except OptionError as error:
+            pytest.skip(str(error))
+    return engine_name
 
 
 def pilot(observation: np.ndarray) -> np.ndarray:

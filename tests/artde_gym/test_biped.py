@@ -15,6 +15,7 @@ from gymnasium.utils.env_checker import check_env
 import artde_gym
 import controllers
 from artde_gym.errors import ActionError, ArtdeGymError, DisturbanceError, OptionError, UnknownNameError
+from artde_gym.sim.factory import EngineName
 
 ID = "BipedWalk-Payload-v0"
 
@@ -44,8 +45,8 @@ VARIED: dict[str, Any] = {
 
 
 @pytest.mark.parametrize("kwargs", [{}, {"control_period": 0.004, "actuator_inertia": "lumped", "arms": "revolute"}])
-def test_gymnasium_checker_passes(kwargs: dict[str, Any]) -> None:
-    env = gym.make(ID, duration=6.0, render_mode="rgb_array", **kwargs)
+def test_gymnasium_checker_passes(drawing_engine: EngineName, kwargs: dict[str, Any]) -> None:
+    env = gym.make(ID, duration=6.0, render_mode="rgb_array", engine=drawing_engine, **kwargs)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         # torques are in Nm by design; RescaleAction gives [-1, 1]
@@ -62,8 +63,8 @@ def test_spec_survives_json() -> None:
     assert first == second
 
 
-def test_same_seed_same_bits_in_one_process() -> None:
-    env, other = make(disturbances=VARIED), make(disturbances=VARIED)
+def test_same_seed_same_bits_in_one_process(engine_name: EngineName) -> None:
+    env, other = make(disturbances=VARIED, engine=engine_name), make(disturbances=VARIED, engine=engine_name)
     first = trajectory(env, seed=1, steps=300)
     trajectory(env, seed=2, steps=50)
     trajectory(env, seed=3, steps=50, options={"disturbances": {}})
@@ -73,19 +74,23 @@ def test_same_seed_same_bits_in_one_process() -> None:
     assert first.tobytes() != trajectory(env, seed=2, steps=300).tobytes()
 
 
-def _trajectory_elsewhere(_: int) -> bytes:
-    return trajectory(make(disturbances=VARIED), seed=1, steps=300).tobytes()
+def _trajectory_elsewhere(engine_name: EngineName) -> bytes:
+    return trajectory(make(disturbances=VARIED, engine=engine_name), seed=1, steps=300).tobytes()
 
 
 def test_same_seed_same_bits_in_another_process() -> None:
+    names: list[EngineName] = ["bullet", "mujoco"]
     with multiprocessing.get_context("spawn").Pool(1) as pool:
-        (there,) = pool.map(_trajectory_elsewhere, [0])
-    assert _trajectory_elsewhere(0) == there
+        there = pool.map(_trajectory_elsewhere, names)
+    assert [_trajectory_elsewhere(name) for name in names] == there
 
 
-def test_two_environments_in_one_process_do_not_touch_each_other() -> None:
-    alone = trajectory(make(disturbances=VARIED), seed=5, steps=100)
-    env, disturber = make(disturbances=VARIED), make(disturbances={"payload": 3.0}, control_period=0.002)
+def test_two_environments_in_one_process_do_not_touch_each_other(engine_name: EngineName) -> None:
+    alone = trajectory(make(disturbances=VARIED, engine=engine_name), seed=5, steps=100)
+    env, disturber = (
+        make(disturbances=VARIED, engine=engine_name),
+        make(disturbances={"payload": 3.0}, control_period=0.002, engine=engine_name),
+    )
     policy, rng = controllers.make("tde", env), np.random.default_rng(0)
     observation, _ = env.reset(seed=5)
     disturber.reset(seed=6)
@@ -101,12 +106,13 @@ def test_two_environments_in_one_process_do_not_touch_each_other() -> None:
     assert alone.tobytes() == np.array(together).tobytes()
 
 
-def test_async_vector_env_with_spawn() -> None:
+def test_async_vector_env_with_spawn(engine_name: EngineName) -> None:
     envs: Any = gym.make_vec(
         ID,
         num_envs=2,
         vectorization_mode="async",
         vector_kwargs={"context": "spawn"},
+        engine=engine_name,
         duration=4.5,
         disturbances=VARIED,
     )
@@ -117,7 +123,7 @@ def test_async_vector_env_with_spawn() -> None:
         actions, state = policy.predict(observations, state)
         observations, *_ = envs.step(actions)
     envs.close()
-    single = make(duration=4.5, disturbances=VARIED)
+    single = make(duration=4.5, disturbances=VARIED, engine=engine_name)
     policy, state = controllers.make("artde", single), None
     observation, _ = single.reset(seed=2)
     for _ in range(20):
@@ -126,8 +132,8 @@ def test_async_vector_env_with_spawn() -> None:
     assert observations[1].tobytes() == observation.tobytes()
 
 
-def test_start_is_at_rest_in_balance_and_without_antagonistic_torques() -> None:
-    env = make(disturbances={})
+def test_start_is_at_rest_in_balance_and_without_antagonistic_torques(engine_name: EngineName) -> None:
+    env = make(disturbances={}, engine=engine_name)
     observation, info = env.reset(seed=0)
     assert info["disturbances"] == {}
     fields = env.unwrapped.observation_layout.split(observation)
@@ -140,8 +146,8 @@ def test_start_is_at_rest_in_balance_and_without_antagonistic_torques() -> None:
 
 
 @pytest.mark.parametrize("mass", [0.0, 1.3, 3.0])
-def test_ground_carries_robot_and_payload(mass: float) -> None:
-    env = make(disturbances={"payload": mass} if mass else {})
+def test_ground_carries_robot_and_payload(engine_name: EngineName, mass: float) -> None:
+    env = make(disturbances={"payload": mass} if mass else {}, engine=engine_name)
     observation, _ = env.reset(seed=0)
     env.step(observation[env.unwrapped.observation_layout["tau_applied"]])
     load = sum(env.unwrapped._engine.foot_loads())
@@ -172,8 +178,8 @@ def test_reward_is_the_scaled_sum_of_its_terms() -> None:
     assert all(np.isfinite(value) and 0 <= value <= 1 for value in terms.values())
 
 
-def test_a_limp_robot_falls_and_says_why() -> None:
-    env = make(control_period=0.01)
+def test_a_limp_robot_falls_and_says_why(engine_name: EngineName) -> None:
+    env = make(control_period=0.01, engine=engine_name)
     env.reset(seed=0)
     terminated = truncated = False
     info: dict[str, Any] = {}
@@ -196,8 +202,8 @@ def test_the_walk_ends_with_truncation_and_then_needs_a_reset() -> None:
         env.step(np.zeros(12))
 
 
-def test_observations_share_no_memory_and_stay_in_bounds() -> None:
-    env = make()
+def test_observations_share_no_memory_and_stay_in_bounds(engine_name: EngineName) -> None:
+    env = make(engine=engine_name)
     first, _ = env.reset(seed=0)
     kept = first.copy()
     second, *_ = env.step(env.unwrapped._tau)
@@ -208,8 +214,8 @@ def test_observations_share_no_memory_and_stay_in_bounds() -> None:
 
 
 @pytest.mark.parametrize("kwargs", [{"speed": 0.2}, {"actuator_inertia": "lumped"}, {"arms": "revolute"}])
-def test_variants_walk(kwargs: dict[str, Any]) -> None:
-    env = make(**kwargs)
+def test_variants_walk(engine_name: EngineName, kwargs: dict[str, Any]) -> None:
+    env = make(**kwargs, engine=engine_name)
     path = trajectory(env, seed=0, steps=5999)
     fields = env.unwrapped.observation_layout.split(path)
     assert np.degrees(np.sqrt(((fields["q"] - fields["q_ref"]) ** 2).mean())) < 1.0
@@ -218,8 +224,8 @@ def test_variants_walk(kwargs: dict[str, Any]) -> None:
     assert distance == pytest.approx(kwargs.get("speed", 0.1) * 1.0, abs=0.03)  # two steps, the last one closes
 
 
-def test_without_rotor_inertia_tde_diverges() -> None:
-    env = make(actuator_inertia="none")
+def test_without_rotor_inertia_tde_diverges(engine_name: EngineName) -> None:
+    env = make(actuator_inertia="none", engine=engine_name)
     policy, state = controllers.make("tde", env), None
     observation, _ = env.reset(seed=0)
     terminated = truncated = False
@@ -231,15 +237,28 @@ def test_without_rotor_inertia_tde_diverges() -> None:
     assert info["time_s"] < 2.0
 
 
-def test_render_shows_the_robot() -> None:
-    env = make(duration=1.0, render_mode="rgb_array")
+def test_render_shows_the_robot(drawing_engine: EngineName) -> None:
+    """Dark feet on the ground, a blue torso above them with an orange payload in it, a white sky."""
+    env = make(duration=1.0, render_mode="rgb_array", engine=drawing_engine)
     env.reset(seed=0)
     picture = env.render()
     assert picture.shape == (480, 640, 3)
     assert picture.dtype == np.uint8
-    assert picture.std() > 10
+    red, blue = picture[..., 0].astype(int), picture[..., 2].astype(int)
+    torso, payload = (blue > red + 50) & (blue < 180), red > blue + 80
+    feet = (picture.max(axis=-1) < 80) & (np.arange(480)[:, None] > 330)
+    (top, middle, bottom), columns = (np.nonzero(part)[0].mean() for part in (torso, payload, feet)), []
+    assert abs(top - middle) < 30
+    assert bottom > top + 150
+    for part, least in ((torso, 4000), (payload, 500), (feet, 1000)):
+        assert part.sum() > least
+        columns.append(np.nonzero(part)[1].mean())
+    assert max(columns) - min(columns) < 40
+    assert picture[:50].min() > 240
+    env.step(env.unwrapped._tau)
+    assert env.render().tobytes() == env.render().tobytes()  # drawing changes nothing
     env.close()
-    assert make(duration=1.0).unwrapped.render() is None
+    assert make(duration=1.0, engine=drawing_engine).unwrapped.render() is None
 
 
 def test_reset_options_replace_disturbances() -> None:
@@ -267,11 +286,12 @@ def test_reset_options_replace_disturbances() -> None:
         ({"step_duration": 0.1}, ["step_duration", "0.1"]),
         ({"duration": -1.0}, ["duration", "-1.0"]),
         ({"duration": float("inf")}, ["duration", "inf"]),
-        ({"engine": "ode"}, ["engine", "ode", "bullet"]),
+        ({"engine": "ode"}, ["engine", "ode", "bullet", "mujoco"]),
         ({"render_mode": "human"}, ["render_mode", "human", "rgb_array"]),
         ({"disturbances": {"payload": -1}}, ["payload.mass", "-1"]),
         ({"disturbances": {"payload": float("nan")}}, ["payload.mass", "nan"]),
         ({"disturbances": {"playload": 1}}, ["playload", "payload"]),
+        ({"disturbances": {"wind": 1.0}}, ["wind", "ojas", "friction"]),
         ({"disturbances": 3}, ["disturbances", "3"]),
     ],
 )
@@ -305,8 +325,8 @@ def test_bad_options_and_actions() -> None:
     assert np.array_equal(env._measure({}), observation)
 
 
-def test_closing_twice_is_safe() -> None:
-    env = make(duration=1.0)
+def test_closing_twice_is_safe(engine_name: EngineName) -> None:
+    env = make(duration=1.0, engine=engine_name)
     env.reset(seed=0)
     env.close()
     env.close()

@@ -21,8 +21,10 @@ from artde_gym.disturbances.ground import AIRBORNE, GrfPulse
 from artde_gym.robots.dynamics import RigidBodyTree
 from artde_gym.robots.ojas import HIP_OFFSET, TOTAL_MASS, ojas
 from artde_gym.robots.spec import RobotSpec
-from artde_gym.sim.bullet import BulletEngine, bullet
-from artde_gym.sim.engine import State
+from artde_gym.sim.bullet import bullet
+from artde_gym.sim.engine import Engine, State
+from artde_gym.sim.factory import EngineName, make_engine
+from artde_gym.sim.mujoco import MujocoEngine, mj
 
 G = 9.81
 WEIGHT = TOTAL_MASS * G
@@ -34,10 +36,10 @@ POINT = tuple[float, float, float]
 # ------------------------------------------------------------------------------------------------------------- helpers
 
 
-def make(disturbances: dict[str, Any], env_id: str = "BipedWalk-Payload-v0", **kwargs: Any) -> Any:
+def make(disturbances: dict[str, Any], **kwargs: Any) -> Any:
     """A quick environment that stands for 2 s."""
     options: dict[str, Any] = {"control_period": 0.004, "actuator_inertia": "lumped", "duration": 2.0, **kwargs}
-    return gym.make(env_id, disable_env_checker=True, disturbances=disturbances, **options).unwrapped
+    return gym.make("BipedWalk-Payload-v0", disable_env_checker=True, disturbances=disturbances, **options).unwrapped
 
 
 class Run(NamedTuple):
@@ -121,14 +123,17 @@ def rotation(quat_xyzw: tuple[float, float, float, float]) -> np.ndarray:
 
 
 class Mechanics:
-    """A simulated robot in our own rigid-body algebra; held joints move, so all of them are read from Bullet."""
+    """A simulated robot in our own rigid-body algebra; held joints move, so all of them are read."""
 
     def __init__(self, engine: Any) -> None:
         self.engine, self.tree = engine, RigidBodyTree(engine.spec)
-        self._joints = [engine._links[name] for name in self.tree.joints]
 
     def joints(self) -> tuple[np.ndarray, np.ndarray]:
-        states = bullet.getJointStates(self.engine._robot, self._joints, physicsClientId=self.engine._client)
+        if isinstance(self.engine, MujocoEngine):
+            joints = [self.engine._data.joint(name) for name in self.tree.joints]
+            return np.concatenate([joint.qpos for joint in joints]), np.concatenate([joint.qvel for joint in joints])
+        links = [self.engine._links[name] for name in self.tree.joints]
+        states = bullet.getJointStates(self.engine._robot, links, physicsClientId=self.engine._client)
         return np.array([state[0] for state in states]), np.array([state[1] for state in states])
 
     def momentum(self) -> np.ndarray:
@@ -147,8 +152,25 @@ class Mechanics:
         return np.asarray(state.position) + frames.origin[body] + frames.rot[body] @ np.asarray(offset)
 
 
-def flying(spec: RobotSpec, gravity: float = 0.0) -> BulletEngine:
-    engine = BulletEngine(spec)
+def payload_position(engine: Any) -> np.ndarray:
+    if isinstance(engine, MujocoEngine):
+        return np.asarray(engine._payload_center())
+    return np.array(bullet.getBasePositionAndOrientation(engine._payload, physicsClientId=engine._client)[0])
+
+
+def payload_velocity(engine: Any) -> np.ndarray:
+    """Of a payload that is held."""
+    if isinstance(engine, MujocoEngine):
+        mj.mj_kinematics(engine._model, engine._data)
+        mj.mj_comPos(engine._model, engine._data)
+        jacobian = np.zeros((3, engine._model.nv))
+        mj.mj_jacBodyCom(engine._model, engine._data, jacobian, None, engine._payload)
+        return jacobian @ engine._data.qvel
+    return np.array(bullet.getBaseVelocity(engine._payload, physicsClientId=engine._client)[0])
+
+
+def flying(engine_name: EngineName, spec: RobotSpec, gravity: float = 0.0) -> Engine:
+    engine = make_engine(engine_name, spec, DT)
     q = np.zeros(12)
     q[[2, 3, 4, 8, 9, 10]] = [-0.4, 0.8, -0.4, -0.2, 0.4, -0.2]
     engine.set_gravity((0.0, 0.0, -gravity))
@@ -168,13 +190,13 @@ def realise(disturbances: dict[str, Any], **words: Any) -> dict[str, Any]:
     ("inertia", "arms"), [("lumped", "fixed"), ("rotor", "fixed"), ("none", "fixed"), ("lumped", "revolute")]
 )
 def test_a_push_adds_its_impulse_to_the_momentum(
-    inertia: Literal["lumped", "rotor", "none"], arms: Literal["fixed", "revolute"], site: str
+    engine_name: EngineName, inertia: Literal["lumped", "rotor", "none"], arms: Literal["fixed", "revolute"], site: str
 ) -> None:
     """Free floating: linear momentum by F dt, angular momentum about the world's origin by r x F dt.
 
     A light push: what the engine's integrator loses grows with the square of the joints' speeds.
     """
-    engine = flying(ojas(inertia, arms=arms))
+    engine = flying(engine_name, ojas(inertia, arms=arms))
     mechanics, force, impulse = Mechanics(engine), np.array([0.3, -0.2, 0.1]), np.zeros(6)
     before = mechanics.momentum()
     for _ in range(50):
@@ -187,8 +209,8 @@ def test_a_push_adds_its_impulse_to_the_momentum(
     engine.close()
 
 
-def test_gravity_adds_its_impulse_too() -> None:
-    engine = flying(ojas("lumped"), gravity=G)
+def test_gravity_adds_its_impulse_too(engine_name: EngineName) -> None:
+    engine = flying(engine_name, ojas("lumped"), gravity=G)
     mechanics = Mechanics(engine)
     before = mechanics.momentum()
     for _ in range(100):
@@ -197,14 +219,14 @@ def test_gravity_adds_its_impulse_too() -> None:
     engine.close()
 
 
-def test_the_arm_push_moves_the_real_arm() -> None:
+def test_the_arm_push_moves_the_real_arm(engine_name: EngineName) -> None:
     """With movable arms the push acts on the upper arm, which gives way to it before its motors hold it."""
     spec = ojas("lumped", arms="revolute")
     assert {site: link for site, link, _ in spec.sites}["left_arm"] == "left_shoulder_yaw"
-    fixed = Mechanics(flying(ojas("lumped")))
+    fixed = Mechanics(flying(engine_name, ojas("lumped")))
     turned = {}
     for site in ("left_arm", "torso"):
-        mechanics = Mechanics(flying(spec))
+        mechanics = Mechanics(flying(engine_name, spec))
         # halfway down the upper arm, and in the same place whether the arm is a link of its own or not
         np.testing.assert_allclose(mechanics.site("left_arm"), [0.3, -0.2 + 0.125, 5.0 + 0.26 - 0.06], atol=1e-9)
         np.testing.assert_allclose(mechanics.site(site), fixed.site(site), atol=1e-9)
@@ -274,8 +296,8 @@ def ground_moment(episode: Run) -> np.ndarray:
     return np.array([HIP_OFFSET * (left - right) - tau[5] - tau[11], -tau[4] - tau[10]])
 
 
-def test_a_payload_off_centre_moves_the_centre_of_pressure() -> None:
-    env, mass = make({}, duration=4.0), 1.3
+def test_a_payload_off_centre_moves_the_centre_of_pressure(engine_name: EngineName) -> None:
+    env, mass = make({}, duration=4.0, engine=engine_name), 1.3
     nominal = run(env, 999, disturbances={"payload": mass})
     for dx, dy in [(0.04, 0.0), (0.0, 0.05), (-0.03, -0.04)]:
         there = run(env, 999, disturbances={"payload": {"mass": mass, "position": [dx, dy, 0.16]}})
@@ -284,8 +306,8 @@ def test_a_payload_off_centre_moves_the_centre_of_pressure() -> None:
         np.testing.assert_allclose(change, [mass * G * dy, -mass * G * dx], atol=0.02 * mass * G * math.hypot(dx, dy))
 
 
-def test_a_payload_comes_and_goes() -> None:
-    env = make({"payload": {"mass": 2.0, "attach": 0.6, "drop": 1.2}})
+def test_a_payload_comes_and_goes(engine_name: EngineName) -> None:
+    env = make({"payload": {"mass": 2.0, "attach": 0.6, "drop": 1.2}}, engine=engine_name)
     episode = run(env, 499)
     time = np.array([info["time_s"] for info in episode.infos])
     for begin, end, weight in [(0.2, 0.6, WEIGHT), (0.9, 1.2, WEIGHT + 2.0 * G), (1.5, 2.0, WEIGHT)]:
@@ -295,24 +317,23 @@ def test_a_payload_comes_and_goes() -> None:
     assert events == [(pytest.approx(0.604), "payload attached"), (pytest.approx(1.204), "payload dropped")]
 
 
-def test_the_dropped_ball_falls_freely() -> None:
-    env = make({"payload": {"mass": 2.0, "position": [0.0, 0.0, 0.2], "drop": 0.1}})
+def test_the_dropped_ball_falls_freely(engine_name: EngineName) -> None:
+    env = make({"payload": {"mass": 2.0, "position": [0.0, 0.0, 0.2], "drop": 0.1}}, engine=engine_name)
     env.reset(seed=0)
     engine, heights = env._engine, []
     for _ in range(100):
         env.step(env._tau)
-        position, _ = bullet.getBasePositionAndOrientation(engine._payload, physicsClientId=engine._client)
-        heights.append(position[2])
+        heights.append(payload_position(engine)[2])
     held, falling = np.array(heights[:25]), np.array(heights[25:])
     assert np.ptp(held) < 1e-3
     time = 0.004 * np.arange(1, len(falling) + 1)
     np.testing.assert_allclose(held[-1] - falling, G * time**2 / 2, atol=3e-3)
 
 
-def test_attaching_a_payload_makes_no_jump() -> None:
+def test_attaching_a_payload_makes_no_jump(engine_name: EngineName) -> None:
     """The ball takes over the motion of its point of the base: nobody's momentum changes, whatever the base does."""
     mass, point = 1.5, (0.05, -0.02, 0.2)
-    engine = flying(ojas("lumped"))
+    engine = flying(engine_name, ojas("lumped"))
     mechanics = Mechanics(engine)
     for _ in range(50):
         engine.push("chest", (60.0, 30.0, 0.0))
@@ -326,8 +347,7 @@ def test_attaching_a_payload_makes_no_jump() -> None:
         for _ in range(steps):
             engine.step(np.zeros(12))
         after = engine.read()
-        velocity, _ = bullet.getBaseVelocity(engine._payload, physicsClientId=engine._client)
-        total = mechanics.momentum()[:3] + mass * np.asarray(velocity)
+        total = mechanics.momentum()[:3] + mass * payload_velocity(engine)
         np.testing.assert_allclose(total, together, atol=float(2e-3 * np.linalg.norm(together)))
         if steps == 1:
             jump = np.subtract(after.velocity, before.velocity)
@@ -375,9 +395,11 @@ def test_flicker_of_the_load_starts_no_pulse() -> None:
 
 
 @pytest.mark.parametrize("magnitude", [0.0, 30.0])
-def test_the_pulse_acts_on_the_foot_that_lands(magnitude: float, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_pulse_acts_on_the_foot_that_lands(
+    engine_name: EngineName, magnitude: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Landings by an independent count over the loads of every physics step, and the balance of vertical momentum."""
-    env = make({"grf_pulse": magnitude} if magnitude else {}, duration=6.0)
+    env = make({"grf_pulse": magnitude} if magnitude else {}, duration=6.0, engine=engine_name)
     env.reset(seed=0)
     mechanics, record = Mechanics(env._engine), Recorder(env, monkeypatch)
     before = mechanics.momentum()
@@ -416,10 +438,10 @@ def test_the_pulse_acts_on_the_foot_that_lands(magnitude: float, monkeypatch: py
 
 
 @pytest.mark.parametrize("heading", [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1)])
-def test_the_robot_slides_beyond_the_friction_angle_only(heading: tuple[int, int]) -> None:
+def test_the_robot_slides_beyond_the_friction_angle_only(engine_name: EngineName, heading: tuple[int, int]) -> None:
     """Coulomb: it slides where the tangent of the slope exceeds the coefficient of the pair, within 4 %."""
     direction = np.array(heading) / np.hypot(*heading)
-    env = make({}, observe_ground_force=True)
+    env = make({}, observe_ground_force=True, engine=engine_name)
     mu = 0.1
     for excess in (0.96, 1.04):
         pitch, roll = np.degrees(np.arctan(excess * mu * direction))
@@ -437,9 +459,9 @@ def test_the_robot_slides_beyond_the_friction_angle_only(heading: tuple[int, int
 
 
 @pytest.mark.parametrize("slope", [{"pitch_deg": 4.0}, {"roll_deg": -5.0}, {"pitch_deg": -3.0, "roll_deg": 4.0}])
-def test_a_slope_tilts_the_ground_force(slope: dict[str, float]) -> None:
+def test_a_slope_tilts_the_ground_force(engine_name: EngineName, slope: dict[str, float]) -> None:
     """At rest the ground's force opposes gravity, whose size a slope leaves alone."""
-    env = make({"slope": slope}, observe_ground_force=True)
+    env = make({"slope": slope}, observe_ground_force=True, engine=engine_name)
     episode = run(env, 499)
     force = episode.fields["ground_force"].reshape(-1, 2, 3).sum(axis=1)[250:].mean(axis=0)
     ahead, left = (math.tan(math.radians(slope.get(name, 0.0))) for name in ("pitch_deg", "roll_deg"))
@@ -448,14 +470,14 @@ def test_a_slope_tilts_the_ground_force(slope: dict[str, float]) -> None:
     assert np.linalg.norm(force) == pytest.approx(WEIGHT, rel=2e-3)
 
 
-def test_a_slope_falls_off_with_the_reset() -> None:
-    env = make({}, observe_ground_force=True)
+def test_a_slope_falls_off_with_the_reset(engine_name: EngineName) -> None:
+    env = make({}, observe_ground_force=True, engine=engine_name)
     run(env, 10, disturbances={"slope": 5.0})
-    assert run(env, 100, disturbances={}).bits == run(make({}, observe_ground_force=True), 100).bits
+    assert run(env, 100, disturbances={}).bits == run(make({}, observe_ground_force=True, engine=engine_name), 100).bits
 
 
-def test_ground_forces_are_foot_loads_and_weight() -> None:
-    env = make({}, observe_ground_force=True)
+def test_ground_forces_are_foot_loads_and_weight(engine_name: EngineName) -> None:
+    env = make({}, observe_ground_force=True, engine=engine_name)
     episode = run(env, 400)
     force = episode.fields["ground_force"].reshape(-1, 2, 3)
     np.testing.assert_allclose(force[:, :, 2], [info["foot_loads"] for info in episode.infos], atol=1e-9)
@@ -580,8 +602,8 @@ def joint_acceleration(spec: RobotSpec, q: np.ndarray, tau: np.ndarray) -> np.nd
     return np.linalg.solve(matrix, np.concatenate([np.zeros(6), tau]))[6:]
 
 
-def test_the_robot_feels_the_lag() -> None:
-    env = make({"motor_lag": 0.01}, control_period=0.001)
+def test_the_robot_feels_the_lag(engine_name: EngineName) -> None:
+    env = make({"motor_lag": 0.01}, control_period=0.001, engine=engine_name)
     observation, _ = env.reset(seed=0)
     part, spec = env.observation_layout["tau_applied"], ojas("lumped")
     mechanics, tau = in_the_air(env), np.zeros(12)
@@ -642,8 +664,10 @@ def scaled(spec: RobotSpec, factor: float) -> RobotSpec:
 
 @pytest.mark.parametrize("factor", [0.7, 1.0, 1.4])
 @pytest.mark.parametrize("inertia", ["lumped", "rotor"])
-def test_mass_error_scales_weight_and_inertia(factor: float, inertia: Literal["lumped", "rotor"]) -> None:
-    env = make({"mass_error": factor}, actuator_inertia=inertia)
+def test_mass_error_scales_weight_and_inertia(
+    engine_name: EngineName, factor: float, inertia: Literal["lumped", "rotor"]
+) -> None:
+    env = make({"mass_error": factor}, actuator_inertia=inertia, engine=engine_name)
     episode = run(env, 250)
     assert episode.load[100:].mean() == pytest.approx(factor * WEIGHT, rel=2e-3)
 
@@ -676,8 +700,12 @@ CROUCH = {f"{side}_{joint}": x for side in ("left", "right") for joint, x in (("
     ],
     ids=["crouch", "ankles", "hip_yaw", "knee"],
 )
-def test_an_initial_pose_starts_off_by_its_offset_at_rest(offsets: dict[str, float], compliance: float) -> None:
-    env = make({"initial_pose": [{"joint": joint, "offset": offset} for joint, offset in offsets.items()]})
+def test_an_initial_pose_starts_off_by_its_offset_at_rest(
+    engine_name: EngineName, offsets: dict[str, float], compliance: float
+) -> None:
+    env = make(
+        {"initial_pose": [{"joint": joint, "offset": offset} for joint, offset in offsets.items()]}, engine=engine_name
+    )
     observation, _ = env.reset(seed=0)
     fields = env.observation_layout.split(observation)
     expected = np.array([offsets.get(joint, 0.0) for joint in ojas().actuated])
@@ -687,8 +715,8 @@ def test_an_initial_pose_starts_off_by_its_offset_at_rest(offsets: dict[str, flo
     assert np.array(env._engine.foot_loads()).sum() == pytest.approx(WEIGHT, rel=0.03)
 
 
-def test_an_initial_pose_can_name_all_joints() -> None:
-    env = make({"initial_pose": {"joint": "all", "offset": {"uniform": [-0.02, 0.02]}}})
+def test_an_initial_pose_can_name_all_joints(engine_name: EngineName) -> None:
+    env = make({"initial_pose": {"joint": "all", "offset": {"uniform": [-0.02, 0.02]}}}, engine=engine_name)
     _, info = env.reset(seed=3)
     realised = info["disturbances"]["initial_pose"]
     assert [entry["joint"] for entry in realised] == list(ojas().actuated)
@@ -722,17 +750,17 @@ EVERYTHING: dict[str, Any] = {
 }
 
 
-def test_all_at_once_are_deterministic_and_can_be_repeated_from_what_was_drawn() -> None:
+def test_all_at_once_are_deterministic_and_can_be_repeated_from_what_was_drawn(engine_name: EngineName) -> None:
     kwargs: dict[str, Any] = {"control_period": 0.001}
-    env = make(EVERYTHING, **kwargs)
+    env = make(EVERYTHING, **kwargs, engine=engine_name)
     first = run(env, 600, seed=7)
     run(env, 30, seed=8)
     assert run(env, 600, seed=7).bits == first.bits
-    assert run(make(EVERYTHING, **kwargs), 600, seed=7).bits == first.bits
+    assert run(make(EVERYTHING, **kwargs, engine=engine_name), 600, seed=7).bits == first.bits
     realised = first.infos[0]["disturbances"]
     assert realised.keys() == EVERYTHING.keys()
     assert Disturbances.parse(realised, ("chest",), ojas().actuated).draw(np.random.default_rng(1)) == realised
-    assert run(make(realised, **kwargs), 600, seed=99).bits == first.bits
+    assert run(make(realised, **kwargs, engine=engine_name), 600, seed=99).bits == first.bits
 
 
 def test_noise_comes_from_the_seed() -> None:
@@ -759,9 +787,14 @@ FORMER: list[dict[str, Any]] = [
     [*(("lumped", before) for before in FORMER), ("rotor", FORMER[0]), ("rotor", FORMER[1])],
     ids=lambda value: value if isinstance(value, str) else next(iter(value)),
 )
-def test_a_reset_without_a_disturbance_leaves_no_trace(inertia: str, before: dict[str, Any]) -> None:
+def test_a_reset_without_a_disturbance_leaves_no_trace(
+    engine_name: EngineName, inertia: str, before: dict[str, Any]
+) -> None:
     """Bit for bit the trajectory of an environment that has never been disturbed, even after a fall."""
-    env, fresh = make({}, actuator_inertia=inertia), make({}, actuator_inertia=inertia)
+    env, fresh = (
+        make({}, actuator_inertia=inertia, engine=engine_name),
+        make({}, actuator_inertia=inertia, engine=engine_name),
+    )
     env.reset(seed=0, options={"disturbances": before})
     for _ in range(300):
         if env.step(np.zeros(12))[2]:
@@ -789,8 +822,9 @@ def test_biped_push_has_the_pushes_of_the_thesis() -> None:
 
 
 @pytest.mark.parametrize("kwargs", [{}, {"arms": "revolute", "observe_ground_force": True}])
-def test_biped_push_passes_gymnasiums_checker(kwargs: dict[str, Any]) -> None:
-    env = gym.make("BipedPush-v0", duration=4.0, actuator_inertia="lumped", render_mode="rgb_array", **kwargs)
+def test_biped_push_passes_gymnasiums_checker(drawing_engine: EngineName, kwargs: dict[str, Any]) -> None:
+    shared: dict[str, Any] = {"duration": 4.0, "actuator_inertia": "lumped", "render_mode": "rgb_array"}
+    env = gym.make("BipedPush-v0", engine=drawing_engine, **shared, **kwargs)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         # torques are in Nm by design; RescaleAction gives [-1, 1]

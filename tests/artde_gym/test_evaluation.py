@@ -312,7 +312,6 @@ def test_command_prints_ours_beside_the_thesis(tmp_path: Path) -> None:
         "3.264",
         "-36.5",
         "no fall",
-        "after disturbances",
     ):
         assert word in outcome.output
     listing = CliRunner().invoke(app, ["list"]).output
@@ -332,6 +331,16 @@ def test_reproduce_runs_both_robots(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert set(pd.read_csv(tmp_path / "quadrotor" / "claims.csv")["scenario"]) == {"Q1"}
     assert CliRunner().invoke(app, [*arguments, "--robot", "biped"]).output.count("Table 3.1") == 0
     assert run_command("reproduce", "--robot", "bipedal").returncode == 2
+
+
+def test_one_command_evaluates_both_robots(tmp_path: Path) -> None:
+    arguments = ["evaluate", "--scenario", "S1,Q1", "--controllers", "tde,artde", "--episodes", "1", "--workers", "1"]
+    arguments += ["--env-kwargs", json.dumps({"duration": 1.4}), "--out", str(tmp_path / "run")]
+    outcome = CliRunner().invoke(app, arguments)
+    assert outcome.exit_code == 0, outcome.output
+    for word in ("Table 2.1", "RMS error (deg)", "Table 3.1", "RMS error (m)", "peak (deg)"):
+        assert word in outcome.output
+    assert "peak (m)" not in outcome.output  # the flight ends before the drop
 
 
 def test_a_recovery_that_never_came_is_counted() -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode
 
 import artde_gym  # noqa: F401  (registers the environments)
@@ -160,6 +161,22 @@ def test_it_is_made_by_the_vector_entry_point() -> None:
     for name in ("robot_name", "control_period", "nominal_robot", "observation_layout", "action_layout", "tracking"):
         assert env.get_attr(name) == (getattr(alone, name),) * 4096
     env.close()
+
+
+def test_spec_survives_json() -> None:
+    env: Any = make(3, disturbances=VARIED, dtype="float32", measurement="mocap")
+    again: Any = gym.make_vec(EnvSpec.from_json(env.spec.to_json()))
+    assert (again.num_envs, again.dtype, again.measurement) == (3, np.float32, "mocap")
+    first, second = (each.reset(seed=3)[1]["disturbances"].tolist() for each in (env, again))
+    assert first == second
+
+
+def test_same_seed_same_bits_after_other_flights(pilot: Pilot) -> None:
+    env = make(3, disturbances=VARIED, duration=0.4)
+    first = flown(env, pilot, 1, 40)
+    flown(env, pilot, 2, 17)
+    assert flown(env, pilot, 1, 40) == first
+    assert flown(env, pilot, 2, 40) != first
 
 
 def test_autoreset_is_that_of_gymnasiums_own_vector(pilot: Pilot) -> None:

@@ -1,4 +1,4 @@
-"""The quadrotor's motion and each of its disturbances by their physics, in the engine and in the batch alike."""
+"""The quadrotor's motion and each of its disturbances by their physics, in each engine and in the batch alike."""
 
 from __future__ import annotations
 
@@ -28,17 +28,19 @@ def hover(x: float, y: float = 0.0, z: float = 0.0) -> np.ndarray:
     return np.array([WEIGHT, x, y, z])
 
 
-BOTH_KINDS = pytest.mark.parametrize("kind", ["engine", "batch"])
+EVERY_KIND = pytest.mark.parametrize("kind", ["bullet", "mujoco", "batch"])
 
 
 class Flight:
-    """One vehicle, in the engine or in the batch, where it is the second of three."""
+    """One vehicle, in an engine or in the batch, where it is the second of three."""
 
     def __init__(self, kind: str, disturbances: dict[str, Any], **kwargs: Any) -> None:
         arguments: dict[str, Any] = {"disturbances": disturbances, "control_period": 0.005, **kwargs}
         self.batch = kind == "batch"
-        make = (lambda: gym.make_vec(ID, num_envs=3, **arguments)) if self.batch else None
-        self.env: Any = make() if make else gym.make(ID, disable_env_checker=True, **arguments).unwrapped
+        if self.batch:
+            self.env: Any = gym.make_vec(ID, num_envs=3, **arguments)
+        else:
+            self.env = gym.make(ID, disable_env_checker=True, engine=kind, **arguments).unwrapped
         self.period: float = self.env.control_period
         self.layout = self.env.observation_layout
 
@@ -69,7 +71,7 @@ def relaxation(speed: float, time: float) -> tuple[float, float]:
 # ------------------------------------------------------------------------------------------------------ without payload
 
 
-@BOTH_KINDS
+@EVERY_KIND
 def test_it_hovers_where_it_starts(kind: str) -> None:
     flight = Flight(kind, {})
     start = flight.reset()
@@ -80,7 +82,7 @@ def test_it_hovers_where_it_starts(kind: str) -> None:
     np.testing.assert_allclose(end["rot_body_to_world"][-1], np.eye(3).ravel(), rtol=0, atol=1e-9)
 
 
-@BOTH_KINDS
+@EVERY_KIND
 def test_it_falls_freely_but_for_drag_once_the_rotors_stop(kind: str) -> None:
     flight = Flight(kind, {"motor_lag": 0.0})
     flight.reset()
@@ -91,7 +93,7 @@ def test_it_falls_freely_but_for_drag_once_the_rotors_stop(kind: str) -> None:
     assert np.abs(fall["body_rates"]).max() < 1e-12
 
 
-@BOTH_KINDS
+@EVERY_KIND
 def test_torque_turns_it_by_its_inertia(kind: str) -> None:
     flight = Flight(kind, {"motor_lag": 0.0})
     flight.reset()
@@ -101,7 +103,7 @@ def test_torque_turns_it_by_its_inertia(kind: str) -> None:
     np.testing.assert_allclose(end["body_rates"][-1], 0.05 * torque / q450.INERTIA, rtol=5e-3)
 
 
-@BOTH_KINDS
+@EVERY_KIND
 @pytest.mark.parametrize("constant", [None, 0.1])
 def test_thrust_follows_its_command_as_a_lag(kind: str, constant: float | None) -> None:
     flight = Flight(kind, {} if constant is None else {"motor_lag": constant}, control_period=0.015)
@@ -119,7 +121,7 @@ def test_thrust_follows_its_command_as_a_lag(kind: str, constant: float | None) 
 # ---------------------------------------------------------------------------------------------------------------- push
 
 
-@BOTH_KINDS
+@EVERY_KIND
 @pytest.mark.parametrize(("start", "duration"), [(0.05, 0.2), (0.0517, 0.1983)])
 def test_a_push_gives_its_momentum(kind: str, start: float, duration: float) -> None:
     force = np.array([1.0, -2.0, 0.5])
@@ -139,7 +141,7 @@ def test_a_push_gives_its_momentum(kind: str, start: float, duration: float) -> 
     assert np.abs(fields["body_rates"]).max() < 1e-9
 
 
-@BOTH_KINDS
+@EVERY_KIND
 def test_a_push_on_a_rotor_turns_it(kind: str) -> None:
     push = {"body": "front_left", "magnitude": 0.4, "direction": [0, 0, -1], "start": 0.01, "duration": 0.05}
     flight = Flight(kind, {"push": [push]})
@@ -149,7 +151,7 @@ def test_a_push_on_a_rotor_turns_it(kind: str) -> None:
     np.testing.assert_allclose(end["body_rates"][-1], 0.05 * moment / q450.INERTIA, rtol=5e-3, atol=2e-3)
 
 
-@BOTH_KINDS
+@EVERY_KIND
 def test_pushes_add_up_and_are_told(kind: str) -> None:
     pushes = [
         {"magnitude": 1.0, "direction": [1, 0, 0], "start": 0.05, "duration": 0.1},
@@ -173,7 +175,7 @@ def loaded(**more: Any) -> dict[str, Any]:
     return {"payload": {"mass": PAYLOAD, **more}}
 
 
-@BOTH_KINDS
+@EVERY_KIND
 def test_it_starts_in_balance_with_the_payload(kind: str) -> None:
     flight = Flight(kind, loaded(position=[0.01, -0.02, -0.1]))
     start = flight.reset()
@@ -185,7 +187,7 @@ def test_it_starts_in_balance_with_the_payload(kind: str) -> None:
     assert np.abs(end["body_rates"]).max() < 1e-4
 
 
-@BOTH_KINDS
+@EVERY_KIND
 def test_without_the_payloads_moment_it_pitches_about_the_common_centre(kind: str) -> None:
     flight = Flight(
         kind,
@@ -203,7 +205,7 @@ def test_without_the_payloads_moment_it_pitches_about_the_common_centre(kind: st
     assert end["body_rates"][-1, 1] == pytest.approx(0.03 * moment / inertia, rel=0.02)
 
 
-@BOTH_KINDS
+@EVERY_KIND
 def test_a_dropped_payload_sets_the_vehicle_free_without_a_jerk(kind: str) -> None:
     flight = Flight(kind, loaded(position=[0.0, 0.0, -0.1], drop=0.1))
     start = flight.reset()
@@ -216,7 +218,7 @@ def test_a_dropped_payload_sets_the_vehicle_free_without_a_jerk(kind: str) -> No
     assert after["position"][-1, 2] - 0.6 == pytest.approx(way, rel=0.01)
 
 
-@BOTH_KINDS
+@EVERY_KIND
 def test_what_moves_goes_on_moving_when_the_payload_goes(kind: str) -> None:
     push = {"body": "front_left", "magnitude": 6.0, "direction": [1, 0.5, 1], "start": 0.1, "duration": 0.1}
     flight = Flight(kind, {**loaded(drop=0.25), "push": [push]})
@@ -235,7 +237,7 @@ def test_what_moves_goes_on_moving_when_the_payload_goes(kind: str) -> None:
     np.testing.assert_allclose((rates[after] - rates[before]) / 0.01, spin, rtol=0, atol=0.15)
 
 
-@BOTH_KINDS
+@EVERY_KIND
 def test_a_payload_may_come_later(kind: str) -> None:
     flight = Flight(kind, loaded(position=[0.0, 0.0, -0.1], attach=0.1))
     start = flight.reset()
@@ -250,7 +252,7 @@ def test_a_payload_may_come_later(kind: str) -> None:
 # ------------------------------------------------------------------------------------------------- air and environment
 
 
-@BOTH_KINDS
+@EVERY_KIND
 def test_a_steady_wind_takes_it_along(kind: str) -> None:
     wind = {"steady": [1.0, -2.0, 0.5], "ambient": 0.0, "fan_speed": 0.0}
     flight = Flight(kind, {"wind": wind})
@@ -261,7 +263,7 @@ def test_a_steady_wind_takes_it_along(kind: str) -> None:
     np.testing.assert_allclose(end["position"][-1] - [0, 0, 0.6], np.multiply(wind["steady"], way), rtol=0.01)
 
 
-@BOTH_KINDS
+@EVERY_KIND
 def test_the_fan_blows_along_its_axis_and_harder_on_it(kind: str) -> None:
     wind = {"ambient": 0.0, "turbulence": 0.0, "fan_place": [0.0, 0.0, 0.6], "fan_direction": [0.0, 3.0, 0.0]}
     aside = {**wind, "fan_place": [0.3, 0.0, 0.6]}
@@ -276,7 +278,7 @@ def test_the_fan_blows_along_its_axis_and_harder_on_it(kind: str) -> None:
     assert speeds[1] == pytest.approx(speeds[0] * math.exp(-0.5), rel=2e-3)
 
 
-@BOTH_KINDS
+@EVERY_KIND
 def test_both_see_the_same_wind_whatever_the_control_period(kind: str) -> None:
     ends = []
     for period in (0.005, 0.015, 0.025):
@@ -288,7 +290,7 @@ def test_both_see_the_same_wind_whatever_the_control_period(kind: str) -> None:
     np.testing.assert_allclose(ends[2], ends[0], rtol=0, atol=1e-12)
 
 
-@BOTH_KINDS
+@EVERY_KIND
 def test_ground_effect_lifts_by_the_published_gain(kind: str) -> None:
     height, strength = 0.3, 8.0
     offset = {"initial_position": {"offset": [0.0, 0.0, height - 0.6]}}
@@ -308,7 +310,7 @@ def test_ground_effect_lifts_by_the_published_gain(kind: str) -> None:
     np.testing.assert_allclose(end["wrench_applied"][-1], HOVER, atol=1e-12)  # without the gain
 
 
-@BOTH_KINDS
+@EVERY_KIND
 def test_ground_effect_rights_a_tilted_vehicle(kind: str) -> None:
     flight = Flight(kind, {"ground_effect": 10.0, "initial_position": {"offset": [0, 0, -0.3]}, "motor_lag": 0.0})
     flight.reset()
@@ -323,7 +325,7 @@ def test_ground_effect_rights_a_tilted_vehicle(kind: str) -> None:
 # ------------------------------------------------------------------------------------------------ actuators and sensors
 
 
-@BOTH_KINDS
+@EVERY_KIND
 def test_commands_come_late_by_whole_periods(kind: str) -> None:
     flight = Flight(kind, {"torque_delay": 3, "motor_lag": 0.0})
     flight.reset()
@@ -331,7 +333,7 @@ def test_commands_come_late_by_whole_periods(kind: str) -> None:
     np.testing.assert_allclose(thrusts, [WEIGHT, WEIGHT, WEIGHT, 15.0, 16.0, 17.0], rtol=1e-12)
 
 
-@BOTH_KINDS
+@EVERY_KIND
 def test_a_rotor_loses_its_share_at_its_time(kind: str) -> None:
     losses = [{"joint": "rear_right", "factor": 0.5, "start": 0.05}, {"joint": "all", "factor": 0.9, "start": 0.1}]
     flight = Flight(kind, {"actuator_loss": losses, "motor_lag": 0.0})
@@ -345,7 +347,7 @@ def test_a_rotor_loses_its_share_at_its_time(kind: str) -> None:
     np.testing.assert_allclose(fields["wrench_applied"][-1], q450.MIXER @ fields["rotor_thrust"][-1], atol=1e-12)
 
 
-@BOTH_KINDS
+@EVERY_KIND
 def test_mass_error_scales_weight_and_inertia(kind: str) -> None:
     flight = Flight(kind, {"mass_error": 1.3, "motor_lag": 0.0})
     start = flight.reset()
@@ -355,7 +357,7 @@ def test_mass_error_scales_weight_and_inertia(kind: str) -> None:
     assert end["body_rates"][-1, 0] == pytest.approx(0.02 * 0.05 / (1.3 * q450.INERTIA[0]), rel=1e-6)
 
 
-@BOTH_KINDS
+@EVERY_KIND
 def test_it_may_start_elsewhere(kind: str) -> None:
     flight = Flight(kind, {"initial_position": {"offset": [0.1, -0.2, 0.05]}})
     start = flight.reset()
@@ -364,7 +366,7 @@ def test_it_may_start_elsewhere(kind: str) -> None:
     np.testing.assert_allclose(flight.fly(HOVER, 0.1)["position"][-1], [0.1, -0.2, 0.65], rtol=0, atol=1e-9)
 
 
-@BOTH_KINDS
+@EVERY_KIND
 def test_sensor_noise_has_the_deviations_that_were_asked_for(kind: str) -> None:
     noise = {"position": 0.01, "velocity": 0.2, "tilt": 0.05, "angular_velocity": 0.3}
     noisy, clean = Flight(kind, {"sensor_noise": noise}), Flight(kind, {})
@@ -387,7 +389,8 @@ def test_sensor_noise_has_the_deviations_that_were_asked_for(kind: str) -> None:
 # ----------------------------------------------------------------------------------------------- one against the other
 
 
-def test_the_batch_flies_as_the_engine_does(pilot: Callable[[np.ndarray], np.ndarray]) -> None:
+@pytest.mark.parametrize("name", ["bullet", "mujoco"])
+def test_the_batch_flies_as_the_engines_do(name: str, pilot: Callable[[np.ndarray], np.ndarray]) -> None:
     disturbances: dict[str, Any] = {
         "payload": {"mass": {"uniform": [0.2, 0.4]}, "drop": 5.0},
         "wind": {"uniform": [0.8, 1.2]},
@@ -398,7 +401,7 @@ def test_the_batch_flies_as_the_engine_does(pilot: Callable[[np.ndarray], np.nda
         "actuator_loss": [{"joint": "front_left", "factor": 0.95, "start": 6.0}],
         "initial_position": {"offset": [{"uniform": [-0.05, 0.05]}, 0.02, 0.0]},
     }
-    engine, batch = (Flight(kind, disturbances, control_period=0.015) for kind in ("engine", "batch"))
+    engine, batch = (Flight(kind, disturbances, control_period=0.015) for kind in (name, "batch"))
     fields = {"engine": engine.reset(seed=7), "batch": batch.reset(seed=7)}
     assert engine.info["disturbances"] == batch.info["disturbances"][1]
     furthest, apart = 0.0, 0.0

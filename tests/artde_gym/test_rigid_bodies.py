@@ -10,8 +10,9 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from artde_gym.robots.q450 import INERTIA, MASS, PAYLOAD_PLACE, q450
-from artde_gym.sim.bullet import BulletEngine
+from artde_gym.sim.factory import EngineName, make_engine
 from artde_gym.sim.rigid_bodies import MassProperties, RigidBodies, composite, cross, times, transposed_times, turned
+from artde_gym.sim.rotation import matrix
 
 G = 9.81
 BARE = MassProperties(MASS, (0.0, 0.0, 0.0), np.diag(INERTIA))
@@ -101,6 +102,13 @@ def test_turning_by_small_vectors() -> None:
     np.testing.assert_allclose(np.einsum("ijn,ikn->jkn", got, got), np.eye(3)[..., None].repeat(6, -1), atol=1e-14)
 
 
+def test_matrix_of_a_quaternion() -> None:
+    for quat in Rotation.from_quat(np.random.default_rng(0).normal(size=(5, 4))).as_quat():
+        x, y, z, w = quat.tolist()
+        expected = Rotation.from_quat(quat).as_matrix().ravel()
+        np.testing.assert_allclose(matrix((x, y, z, w)), expected, rtol=0, atol=1e-15)
+
+
 @pytest.mark.parametrize("properties", [BARE, BOTH], ids=["bare", "loaded"])
 def test_tumbling_is_of_second_order(properties: MassProperties) -> None:
     rot, rates = tumble(properties, SPIN, np.eye(3), 1.0)
@@ -116,8 +124,8 @@ def test_tumbling_is_of_second_order(properties: MassProperties) -> None:
 
 
 @pytest.mark.parametrize("loaded", [False, True], ids=["bare", "loaded"])
-def test_bullet_tumbles_likewise(loaded: bool) -> None:
-    engine = BulletEngine(q450(), 0.001)
+def test_engines_tumble_likewise(loaded: bool, engine_name: EngineName) -> None:
+    engine = make_engine(engine_name, q450(), 0.001)
     engine.set_gravity((0.0, 0.0, 0.0))
     engine.place((0.0, 0.0, 5.0), np.zeros(0))
     if loaded:

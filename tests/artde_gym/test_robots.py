@@ -1,4 +1,4 @@
-"""Ojas against Pinocchio and Bullet, and against itself: symmetry, statics, finite differences."""
+"""Ojas against Pinocchio and the engines, and against itself: symmetry, statics, finite differences."""
 
 import dataclasses
 import math
@@ -20,6 +20,7 @@ from artde_gym.robots.ojas import ojas
 from artde_gym.robots.spec import RobotSpec, box_link
 from artde_gym.robots.support import Supported
 from artde_gym.sim.bullet import BulletEngine
+from artde_gym.sim.factory import make_engine
 from controllers.laws.validity import tde_eigenvalues, tde_is_valid
 
 SPECS = {
@@ -242,7 +243,7 @@ def test_feet_out_of_reach_are_refused(ankle, thigh, shank):
         leg_angles(np.array([reachable, ankle]), thigh, shank)
 
 
-# ------------------------------------------------------------------------------------------------------------ in Bullet
+# --------------------------------------------------------------------------------------------------------- in an engine
 
 
 @pytest.mark.parametrize("name", ["rotor-fixed-links", "rotor-revolute-links", "lumped-fixed", "none-revolute"])
@@ -264,12 +265,11 @@ def test_bullet_has_exactly_the_inertias_of_the_spec(name):
 
 
 @pytest.mark.parametrize("name", ["rotor-fixed", "lumped-fixed", "none-fixed"])
-def test_momentum_of_a_fall_in_bullet(name):
+def test_momentum_of_a_fall(engine_name, name):
     """Nothing but the weight acts on the robot as a whole, whatever its joints do: no damping."""
-    spec = SPECS[name]
-    tree, tau = RigidBodyTree(spec.with_rotor_links() if any(spec.armature) else spec), np.zeros(12)
+    engine, tau = make_engine(engine_name, SPECS[name], 1e-3), np.zeros(12)
+    tree = RigidBodyTree(engine.spec)
     tau[[0, 9]] = 0.5, -0.5
-    engine = BulletEngine(spec, 1e-3)
     engine.place((0.0, 0.0, 3.0), standing())
     for _ in range(100):
         engine.step(tau)
@@ -282,11 +282,11 @@ def test_momentum_of_a_fall_in_bullet(name):
 
 
 @pytest.mark.parametrize("name", ["rotor-fixed", "lumped-fixed", "none-fixed"])
-def test_first_step_of_a_fall_in_bullet(name):
+def test_first_step_of_a_fall(engine_name, name):
     spec = SPECS[name]
     q = walking_pattern(0.1, 1.0, 4.5, 0.001).q[0]
     tau = np.random.default_rng(13).normal(size=12)
-    engine = BulletEngine(spec, 1e-3)
+    engine = make_engine(engine_name, spec, 1e-3)
     engine.place((0.0, 0.0, 3.0), q)
     engine.step(tau)
     measured = engine.read()
@@ -296,8 +296,7 @@ def test_first_step_of_a_fall_in_bullet(name):
         force = np.concatenate([np.zeros(6), tau]) - tree.inverse_dynamics(q, 0 * q, 0 * q)
         return np.linalg.solve(tree.mass_matrix(q), force)
 
-    simulated = RigidBodyTree(spec.with_rotor_links() if any(spec.armature) else spec)
-    expected = predicted(simulated)
+    expected = predicted(RigidBodyTree(engine.spec))
     np.testing.assert_allclose(measured.qd / 1e-3, expected[6:], rtol=1e-3, atol=1e-3 * np.abs(expected[6:]).max())
     base = np.concatenate([measured.velocity, measured.angular_velocity]) / 1e-3
     np.testing.assert_allclose(base, expected[:6], rtol=1e-3, atol=1e-3 * np.abs(expected[:6]).max())

@@ -431,6 +431,7 @@ def test_artde_by_hand(case):
         assert (memory.beta_0, memory.beta_1) == after
         s = np.array(e) / 2 + np.array(ed)
         xi, root = (1.0 if (e, ed) == D else 5.0), (7.0 if (e, ed) in (A, E) else 5.0)
+        assert memory.c == b0 + b1 * xi
         du = 2.0 * (b0 + b1 * xi) * s / root
         expected = np.array([7.0, -7.0]) + 3.0 * (np.array(ed) + np.array(e) + du)
         np.testing.assert_allclose(tau, expected, rtol=1e-14)

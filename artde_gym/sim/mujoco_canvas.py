@@ -1,0 +1,95 @@
+"""Pictures of a MuJoCo world, drawn by OpenGL without a display: through EGL, or else OSMesa.
+
+The environment variable MUJOCO_GL ("egl", "osmesa") chooses one of them, as everywhere in MuJoCo.
+"""
+
+from __future__ import annotations
+
+import atexit
+import ctypes
+import importlib
+import os
+import weakref
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from artde_gym.arrays import Array
+from artde_gym.errors import OptionError
+from artde_gym.sim.engine import PAYLOAD_COLOUR, PAYLOAD_RADIUS, Camera
+
+mj: Any = mujoco  # compiled, without type information
+
+_LIBRARIES = {"egl": "libEGL.so.1", "osmesa": "libOSMesa.so.8"}
+_ALLOWED = (
+    "with OpenGL of EGL or OSMesa (Debian: apt install libegl1 libgl1-mesa-dri, or libosmesa6); or engine 'bullet'"
+)
+_SHAPES = 1000  # at most, in a scene
+
+
+class Canvas:
+    """Draws one model.
+
+    Raises:
+        OptionError: where there is no OpenGL without a display.
+    """
+
+    def __init__(self, model: Any) -> None:
+        self._model = model
+        self._context = context = _context()
+        context.make_current()
+        self._painter = mj.MjrContext(model, mj.mjtFontScale.mjFONTSCALE_100)
+        mj.mjr_setBuffer(mj.mjtFramebuffer.mjFB_OFFSCREEN, self._painter)
+        self._scene = mj.MjvScene(model, _SHAPES)
+        self._finalizer = weakref.finalize(self, _free, context, self._painter)
+        self._finalizer.atexit = False  # too late: EGL's display is closed by then
+        atexit.register(self._finalizer)
+
+    def draw(self, data: Any, camera: Camera, ball: Array | None) -> NDArray[np.uint8]:
+        """A picture, (height, width, 3), with the payload's ball at `ball` (m), if there is one."""
+        scene, rect = self._scene, mj.MjrRect(0, 0, camera.width, camera.height)
+        eye = mj.MjvCamera()
+        eye.lookat[:] = camera.target
+        eye.distance, eye.azimuth, eye.elevation = camera.distance, camera.yaw_deg + 90.0, -camera.pitch_deg
+        everything = mj.mjtCatBit.mjCAT_ALL.value
+        mj.mjv_updateScene(self._model, data, mj.MjvOption(), None, eye, everything, scene)
+        if ball is not None:
+            size, colour = np.full(3, PAYLOAD_RADIUS), np.array(PAYLOAD_COLOUR, dtype=np.float32)
+            shape = mj.mjtGeom.mjGEOM_SPHERE
+            mj.mjv_initGeom(scene.geoms[scene.ngeom], shape, size, ball, np.eye(3).ravel(), colour)
+            scene.ngeom += 1
+        picture = np.empty((camera.height, camera.width, 3), dtype=np.uint8)
+        self._context.make_current()
+        if (self._painter.offWidth, self._painter.offHeight) != (camera.width, camera.height):
+            mj.mjr_resizeOffscreen(camera.width, camera.height, self._painter)
+        mj.mjr_render(rect, scene, self._painter)
+        mj.mjr_readPixels(picture, None, rect, self._painter)
+        return picture[::-1].copy()  # OpenGL counts rows from below
+
+    def close(self) -> None:
+        """Free what the context holds; safe to call twice."""
+        self._finalizer()
+        atexit.unregister(self._finalizer)
+
+
+def _context() -> Any:
+    """An OpenGL context without a display."""
+    chosen = os.environ.get("MUJOCO_GL", "").lower()
+    for name in (chosen,) if chosen in _LIBRARIES else _LIBRARIES:
+        try:
+            ctypes.CDLL(_LIBRARIES[name])
+        except OSError:
+            continue
+        try:
+            return importlib.import_module(f"mujoco.{name}").GLContext(1, 1)  # it draws into a buffer of its own
+        except (ImportError, AttributeError, RuntimeError) as error:
+            raise OptionError("render_mode", "rgb_array", f"{_ALLOWED}; {name} said: {error}") from error
+    raise OptionError("render_mode", "rgb_array", _ALLOWED)
+
+
+def _free(context: Any, painter: Any) -> None:
+    context.make_current()
+    painter.free()
+    context.free()
