@@ -66,7 +66,7 @@ def test_the_same_folder_gives_the_same_bytes(flights):
 def test_everything_of_the_biped_and_of_the_quadrotor_is_there(walks, flights):
     shared = ["Tracking error", "Lyapunov function V", "b0", "sliding variable", "Block diagram", "M^-1 m_bar"]
     own = {
-        walks: ["Claims of the thesis", "Ground reaction force", "centre of mass", "Desired joint", "Tilt", "push0"],
+        walks: ["Claims of the thesis", "Ground reaction force under artde", "centre of mass", "Desired joint", "Tilt", "push0"],
         flights: ["three dimensions", "XZ plane", "YZ plane", "phi", "theta", ">drop<"],
     }
     for folder, words in own.items():
