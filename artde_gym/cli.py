@@ -82,6 +82,7 @@ def evaluate(
         int | None, typer.Option(help="Episodes that leave signals. Default: all of them; none in the batch backend.")
     ] = None,
     trace_hz: Annotated[float, typer.Option(help="Rate of stored signals; inf for all of them.")] = 100.0,
+    report: Annotated[bool, typer.Option("--report", help="Write report.html, too.")] = False,
 ) -> None:
     """Compare controllers on the same seeded episodes and print them beside the thesis."""
     if scenario is None:
@@ -112,6 +113,8 @@ def evaluate(
             on_progress=display,
         )
     print_result(result, console)
+    if report:
+        _report(folder, console)
     if not result.complete:
         raise typer.Exit(130)
 
@@ -135,6 +138,7 @@ def frontier(
     env_kwargs: Annotated[str | None, typer.Option(help="JSON, arguments of the environment.")] = None,
     gains: Annotated[str | None, typer.Option(help='JSON, e.g. {"artde": {"gamma_0": 200}}.')] = None,
     backend: Annotated[str, typer.Option(help="single or batch, as for `evaluate`.")] = "single",
+    report: Annotated[bool, typer.Option("--report", help="Write report.html, too.")] = False,
 ) -> None:
     """Find how much of one disturbance each controller survives; the same command continues an interrupted run."""
     kwargs = _json("--env-kwargs", env_kwargs)
@@ -162,6 +166,8 @@ def frontier(
             on_progress=lambda value, update: display(update, f"{vary} {value:g}"),
         )
     print_frontier(found, console)
+    if report and found.folder is not None:
+        _report(found.folder, console)
     if not found.complete:
         raise typer.Exit(130)
 
@@ -225,6 +231,7 @@ def reproduce(
     out: Annotated[
         Path, typer.Option(help="Results folder, one inside for each engine and robot; the same call continues it.")
     ] = Path("runs/reproduce"),
+    report: Annotated[bool, typer.Option("--report", help="Write report.html, too.")] = False,
 ) -> None:
     """Run the thesis' scenarios and print its tables beside ours, then each of its claims with a verdict."""
     robots = list(ROBOTS) if robot == "all" else [robot]
@@ -255,6 +262,8 @@ def reproduce(
             print_result(found.result, console)
             print_claims(found.claims, console)
             verdicts[one] = found.claims
+            if report and found.result.folder is not None:
+                _report(found.result.folder, console)
             if not found.result.complete:
                 raise typer.Exit(130)
         if len(engines) > 1:
@@ -320,6 +329,14 @@ def train(
 
         policy = go(training, out, on_progress)
     print(f"best policy: {policy}")
+
+
+@app.command("report")
+def report_(
+    folder: Annotated[Path, typer.Argument(help="Results folder of `evaluate`, `reproduce` or `frontier`.")],
+) -> None:
+    """Write report.html into a results folder, finished or not: one file that needs no network."""
+    _report(folder, Console())
 
 
 @app.command("list")
@@ -394,6 +411,12 @@ class Display:
             for (name, controller, numbers), time in self._running.items()
         )
         self._progress.update(self._bar, completed=update.finished, total=update.total, description=text, what=what)
+
+
+def _report(folder: Path, console: Console) -> None:
+    from artde_gym.evaluation.report import write_report  # only when asked for
+
+    console.print(f"Report: {write_report(folder)}", soft_wrap=True)
 
 
 def _names(text: str) -> list[str]:

@@ -79,7 +79,7 @@ class _Tables:
             note += f"; thesis: {thesis.TABLES[reference]}"
         parts: list[RenderableType] = [title, Text(note, style="dim"), self._falls(scenario, reference)]
         tracking = tracking_of(pd.concat(rows)["env"].iloc[0])
-        for metric, what, axes in _measured(tracking, () if entry is None else entry.phases):
+        for metric, what, axes in measured(tracking, () if entry is None else entry.phases):
             parts += self._metric(scenario, reference, metric, what, axes)
         return Group(*parts, *self._events(scenario, tracking))
 
@@ -154,7 +154,7 @@ class _Tables:
         return [table] if table.row_count else []
 
 
-def _measured(tracking: Tracking, phases: Sequence[tuple[float, float]]) -> list[tuple[str, str, list[str]]]:
+def measured(tracking: Tracking, phases: Sequence[tuple[float, float]]) -> list[tuple[str, str, list[str]]]:
     """Metrics to show, their titles and axes: each phase by itself where the scenario has phases."""
     metrics = [
         (f"{metric}_{tracked.unit}", f"{text} ({UNITS[tracked.unit][0]})", list(tracked.axes))

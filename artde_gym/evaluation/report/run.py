@@ -1,0 +1,161 @@
+"""A results folder as a report reads it, finished or not."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from artde_gym.arrays import Array
+from artde_gym.errors import StoreError
+from artde_gym.evaluation.environments import tracking_of
+from artde_gym.evaluation.metrics import Span, events_of
+from artde_gym.evaluation.result import Result
+from artde_gym.tracking import Tracking
+
+TIME = "time"
+INSIDE = "policy."
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """An evaluation on disk.
+
+    Attributes:
+        result: its finished episodes.
+        record: what `summary.json` holds: configuration and provenance.
+        claims: the thesis' claims with their verdicts, if they were judged.
+    """
+
+    folder: Path
+    result: Result
+    record: Mapping[str, Any]
+    claims: pd.DataFrame | None = None
+
+    @classmethod
+    def read(cls, folder: Path) -> Run:
+        """Read an evaluation's folder; a row that is being written is left out.
+
+        Raises:
+            StoreError: if it is none.
+        """
+        try:
+            record = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+            wanted = record["configuration"]
+            count = len(wanted["cells"]) * len(wanted["controllers"]) * wanted["episodes"]
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise StoreError("results folder", str(folder), "one that `evaluate` or `frontier` wrote") from error
+        path = folder / "episodes.csv"
+        text = path.read_text(encoding="utf-8") if path.exists() else ""
+        whole = text[: text.rfind("\n") + 1]
+        episodes = pd.read_csv(io.StringIO(whole)) if whole else pd.DataFrame({"controller": [], "scenario": []})
+        claims = folder / "claims.csv"
+        judged = pd.read_csv(claims, keep_default_na=False) if claims.exists() else None
+        return cls(folder, Result(episodes, folder, len(episodes) >= count), record, judged)
+
+    def cell(self, scenario: str) -> Mapping[str, Any]:
+        """Environment and arguments of a scenario."""
+        return next(cell for cell in self.record["configuration"]["cells"] if cell["name"] == scenario)
+
+    def tracking(self, scenario: str) -> Tracking:
+        return tracking_of(self.cell(scenario)["env_id"])
+
+    def episode(self, scenario: str) -> Episode | None:
+        """The first episode whose signals are stored, of all controllers that have it."""
+        numbers = sorted({int(i) for name in self.result.controllers for i in self.result.rows(scenario, name).index})
+        for number in numbers:
+            found = {
+                name: signals
+                for name in self.result.controllers
+                if (signals := self._signals(scenario, name, number)) is not None
+            }
+            if found:
+                return Episode(number, found)
+        return None
+
+    def _signals(self, scenario: str, controller: str, number: int) -> Signals | None:
+        path = self.folder / "traces" / scenario / f"{controller}-{number}.npz"
+        rows = self.result.rows(scenario, controller)
+        if not path.exists() or number not in rows.index:
+            return None
+        with np.load(path) as stored:
+            return Signals({name: stored[name] for name in stored.files}, rows.loc[number].to_dict())
+
+
+@dataclasses.dataclass(frozen=True)
+class Signals:
+    """What one controller did in one episode.
+
+    Attributes:
+        fields: observations by name (samples, size), the policy's inside under "policy.<name>", "time" (samples,).
+        row: of the table of episodes.
+    """
+
+    fields: Mapping[str, Array]
+    row: Mapping[Any, Any]
+
+    @property
+    def time(self) -> Array:
+        return self.fields[TIME]
+
+    @property
+    def fell(self) -> bool:
+        return bool(self.row["fell"])
+
+    def inside(self, name: str) -> Array | None:
+        """A diagnostic of the policy (samples, ...), if it has it."""
+        return self.fields.get(INSIDE + name)
+
+
+@dataclasses.dataclass(frozen=True)
+class Episode:
+    """The same seed under several controllers."""
+
+    number: int
+    signals: Mapping[str, Signals]
+
+    @property
+    def seed(self) -> int:
+        return int(next(iter(self.signals.values())).row["seed"])
+
+    @property
+    def end(self) -> float:
+        """The longest of the runs (s)."""
+        return max(float(signals.time[-1]) for signals in self.signals.values())
+
+    @property
+    def disturbances(self) -> dict[str, Any]:
+        """What was drawn, as the grammar writes it."""
+        row = next(iter(self.signals.values())).row
+        return nested({str(key): value for key, value in row.items() if str(key).startswith("disturbance.")})
+
+    @property
+    def events(self) -> dict[str, Span]:
+        return {name: span for name, span in events_of(self.disturbances).items() if span[0] <= self.end}
+
+
+def nested(columns: Mapping[str, Any]) -> dict[str, Any]:
+    """Columns such as "disturbance.push.0.start" as the nested mappings and lists that they came from."""
+    root: dict[str, Any] = {}
+    for column, value in columns.items():
+        if isinstance(value, float) and np.isnan(value):
+            continue  # of another scenario
+        *path, last = column.split(".")[1:]
+        place = root
+        for part in path:
+            place = place.setdefault(part, {})
+        place[last] = value
+    return _lists(root)
+
+
+def _lists(value: Any) -> Any:
+    if not isinstance(value, dict):
+        return value
+    inner = {key: _lists(item) for key, item in value.items()}
+    return list(inner.values()) if inner and all(key.isdigit() for key in inner) else inner
