@@ -130,7 +130,7 @@ def register_laws() -> None:
     law("atde", "TDE + one adaptive gain", law="atde")
     law("artde", "TDE + adaptive-robust term, as printed in the thesis", law="artde")
     law("artde-robust", "ARTDE with bounded gains", law="artde", preset="robust")
-    law("pid", "PID; biped: equal to TDE, quadrotor: a tuned cascade", law="pid")
+    law("pid", "PID; biped: equal to TDE, quadrotor: positional, in both loops", law="pid")
     law("tde+c", "TDE + robust term of constant gain (ablation)", law="tde+c")
     law("tde+kd", "TDE at the stiffer gains equivalent to it (ablation)", law="tde+kd")
     law("asmc", "quadrotor: adaptive sliding mode (a law of ours)", law="asmc")

@@ -157,7 +157,7 @@ def test_attitude_error_is_in_euler_angles_desired_minus_actual(env):
     ("name", "overrides", "error", "words"),
     [
         ("computed-torque", {}, UnknownNameError, "'q450' is 'computed-torque'.*artde.*tde"),
-        ("artde", {"preset": "tuned!"}, UnknownNameError, "'tuned!'.*'thesis', 'robust'"),
+        ("artde", {"preset": "tuned!"}, UnknownNameError, "'tuned!'.*'thesis', 'robust', 'tuned'"),
         ("tde", {"k_p": 1.0}, GainError, "'k_p'.*k_p_p, k_p_q"),
         ("artde", {"gama_0_q": 1.0}, GainError, "'gama_0_q'.*did you mean 'gamma_0_q'"),
         ("tde", {"k_p_q": -1.0}, GainError, "k_p_q is -1.0"),
@@ -221,6 +221,16 @@ def test_every_controller_flies_the_path(env, name):
     assert "fall_reason" not in info
     assert info["time_s"] == pytest.approx(70.0, abs=0.02)
     assert rms(fields).max() < limit
+
+
+@pytest.mark.parametrize("name", ["tde", "atde", "artde", "pid", "asmc", "geometric", "indi"])
+def test_tuned_gains_fly_the_first_loop_better_than_the_default(env, name):
+    errors = []
+    for options in ({}, {"preset": "tuned"}):
+        fields, info, _ = flown(env, controllers.make(name, env, **options), 20.0)
+        assert "fall_reason" not in info
+        errors.append(np.linalg.norm(rms(fields)))
+    assert errors[1] < errors[0]
 
 
 @pytest.mark.parametrize("name", ["tde", "artde"])
