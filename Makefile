@@ -12,7 +12,7 @@ help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*  ## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
 
 evaluate: .venv/core  ## the main job: TDE, ATDE and ARTDE beside the thesis, into runs/main (more options: ARGS=...)
-	$(BIN)/artde-gym evaluate --episodes 2 --out runs/main $(ARGS)
+	$(BIN)/artde-gym evaluate --episodes 3 --out runs/main $(ARGS)
 
 test: check  ## all checks, then all tests (a selection: ARGS=...)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 $(ARGS)
