@@ -127,8 +127,8 @@ A walk of 58 s without an error earns a little under 203.
 The robot stands on both feet in the pattern's first pose, at rest, in balance with its payload.
 
 ## End
-*Terminated* when it has fallen: tilt above 35 degrees (`info["fall_reason"] == "tilt"`) or base below 0.25 m
-(`"height"`). *Truncated* at the end of the walk.
+*Terminated* when it has fallen: tilt above 35 degrees (`info["fall_reason"] == "tilt"`), base below 0.25 m (`"height"`),
+or joint speeds whose norm passes 200 rad/s (`"speed"`: it has diverged). *Truncated* at the end of the walk.
 
 ## Arguments
 | name | default | allowed | meaning |
@@ -367,10 +367,13 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
     def _fall(self) -> str | None:
         x, y = self._state.quat_xyzw[:2]
         up = 1.0 - 2.0 * (x * x + y * y)  # the world's z component of the base's z axis
-        if not up >= _COS_FALL:  # a state that is no number any more counts as fallen
+        if not up >= _COS_FALL:  # comparisons the way round that a state which is no number any more counts as fallen
             return "tilt"
         if self._state.position[2] < FALL_HEIGHT:
             return "height"
+        speeds = self._state.qd
+        if not speeds.dot(speeds) <= MAX_SPEED * MAX_SPEED:
+            return "speed"
         return None
 
 

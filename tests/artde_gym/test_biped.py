@@ -233,6 +233,7 @@ def test_without_rotor_inertia_tde_diverges(engine_name: EngineName) -> None:
     while not (terminated or truncated):
         action, state = policy.predict(observation, state)
         observation, _, terminated, truncated, info = env.step(action)
+        assert np.isfinite(observation).all()
     assert terminated
     assert info["time_s"] < 2.0
 

@@ -469,6 +469,7 @@ def test_ctrl_c_keeps_every_finished_episode(tmp_path: Path) -> None:
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # background jobs are born ignoring it
     )
     table = tmp_path / "run" / "episodes.csv"
     deadline = time.monotonic() + 60
