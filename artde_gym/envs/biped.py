@@ -127,8 +127,9 @@ A walk of 58 s without an error earns a little under 203.
 The robot stands on both feet in the pattern's first pose, at rest, in balance with its payload.
 
 ## End
-*Terminated* when it has fallen: tilt above 35 degrees (`info["fall_reason"] == "tilt"`), base below 0.25 m (`"height"`),
-or joint speeds whose norm passes 200 rad/s (`"speed"`: it has diverged). *Truncated* at the end of the walk.
+*Terminated* when it has fallen: tilt above 35 degrees (`info["fall_reason"] == "tilt"`), base below 0.25 m
+(`"height"`), or joint speeds whose norm passes 200 rad/s (`"speed"`: it has diverged). *Truncated* at the end of the
+walk.
 
 ## Arguments
 | name | default | allowed | meaning |
