@@ -39,6 +39,7 @@ SETTLE = 0.3  # s, before the first step, for feet and payload to come to rest
 SETTLE_POSE = 1.0  # s, likewise on a slope or in another pose, where the robot rocks first
 SETTLE_STIFFNESS = 420.0  # Nm/rad: what TDE at 1 ms has, Kd m_bar / L
 SETTLE_DAMPING = 10.0  # Nm s/rad
+BARE_DAMPING = 0.5  # Nm s/rad, likewise without rotors: held for a step, more than 2 M / TIME_STEP of a foot diverges
 MAX_SPEED = 200.0  # rad/s, bound of observed joint speeds
 
 N_JOINTS = 12
@@ -203,6 +204,7 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         model = dataclasses.replace(ojas(actuator_inertia, arms=arms), feet_collide=self_collision)
         self._sites = [name for name, _, _ in model.sites]
         self._disturbances = self._parse(self.default_disturbances if disturbances is None else disturbances)
+        self._settle_damping = BARE_DAMPING if actuator_inertia == "none" else SETTLE_DAMPING
         self._substeps = steps_per_period(control_period, TIME_STEP)
         self.control_period = self._substeps * TIME_STEP
         self._engine: Engine = make_engine(engine, model, TIME_STEP, renders=render_mode is not None)
@@ -314,7 +316,7 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         tau = self._stand
         for _ in range(round(duration / TIME_STEP)):
             state = self._engine.read()
-            tau = self._stand + SETTLE_STIFFNESS * (pose - state.q) - SETTLE_DAMPING * state.qd
+            tau = self._stand + SETTLE_STIFFNESS * (pose - state.q) - self._settle_damping * state.qd
             self._engine.step(tau)
         return np.clip(tau, -robot.TORQUE_LIMIT, robot.TORQUE_LIMIT)
 
