@@ -146,5 +146,5 @@ def register_laws() -> None:
         "tde+ppo",
         "baselines.saved:make_shipped",
         text="quadrotor: TDE + a residual that reinforcement learning (PPO) has trained in a gale",
-        policies={"QuadInfinity-Payload-v0": "quadrotor-gale"},
+        policies={"q450": "quadrotor-gale"},
     )

@@ -10,6 +10,7 @@ A row's action does not depend on what other rows there are, to the bit.
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,13 +38,13 @@ class Network:
     layers: tuple[tuple[Float, Float], ...]
     squashed: bool = False
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_scale", (1.0 / np.sqrt(self.variance.astype(np.float64) + EPSILON)).astype("f4"))
+    @functools.cached_property
+    def _scale(self) -> Float:
+        return (1.0 / np.sqrt(self.variance.astype(np.float64) + EPSILON)).astype("f4")
 
     def __call__(self, features: Array) -> Float:
         """The action (..., n_actions) for features (..., n_features)."""
-        scale: Float = getattr(self, "_scale")  # noqa: B009  # set above, past the frozen dataclass
-        x = (features.astype(np.float32) - self.mean) * scale
+        x = (features.astype(np.float32) - self.mean) * self._scale
         x = np.minimum(np.maximum(x, -CLIP), CLIP)[..., None, :]  # one product a row: a batch rounds differently
         last = len(self.layers) - 1
         for i, (weight, bias) in enumerate(self.layers):

@@ -44,21 +44,15 @@ def make_shipped(env: Any, *, policies: dict[str, str]) -> ResidualPolicy:
 
     Args:
         env: the environment that it will drive.
-        policies: environment id, or robot -> name of the policy.
+        policies: robot -> name of the policy.
 
     Raises:
-        UnknownNameError: if there is none for the environment.
+        UnknownNameError: if there is none for the robot.
     """
-    known = {key: name for key, name in policies.items() if (SHIPPED / name / DESCRIPTION).exists()}
-    spec = getattr(env, "spec", None)
-    key = spec.id if spec is not None and spec.id in known else Plant.of(env).robot
-    if key not in known:
-        raise UnknownNameError(
-            "environment of a trained policy",
-            key if spec is None else spec.id,
-            among(key, known) if known else "none: train one",
-        )
-    return load(SHIPPED / known[key], env)
+    robot = Plant.of(env).robot
+    if robot not in policies:
+        raise UnknownNameError("robot of a trained policy", robot, among(robot, policies))
+    return load(SHIPPED / policies[robot], env)
 
 
 class _Trained:
