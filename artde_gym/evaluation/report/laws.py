@@ -33,13 +33,13 @@ class Laws:
     def __init__(self, run: Run) -> None:
         self._run = run
         self._given: Mapping[str, Mapping[str, Any]] = run.record["configuration"].get("gains", {})
+        self.gains = functools.cache(self._find_gains)  # scenario -> the same dict, found once a report
 
     def robot(self, scenario: str) -> Any:
         """The nominal robot (`RobotSpec`)."""
         return self._environment(scenario).unwrapped.nominal_robot
 
-    @functools.cache  # noqa: B019  (as long as one report is written)
-    def gains(self, scenario: str) -> dict[str, Gains]:
+    def _find_gains(self, scenario: str) -> dict[str, Gains]:
         """Controller -> gain -> value; those of a cascade's loops end in _p and _q."""
         env, found = self._environment(scenario), {}
         for name in self._run.result.controllers:
