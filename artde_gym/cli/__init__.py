@@ -1,0 +1,47 @@
+"""The `artde-gym` command, one module a subcommand; the one package here that may import controllers and baselines."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import gymnasium as gym
+import typer
+
+from artde_gym import __version__
+from artde_gym.cli import evaluate, frontier, listing, report, reproduce, train, tune
+from artde_gym.errors import ArtdeGymError
+from controllers import GainError
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    help="Environments and judges of time-delay control.",
+)
+app.command()(evaluate.evaluate)
+app.command()(frontier.frontier)
+app.command()(tune.tune)
+app.command()(reproduce.reproduce)
+app.command()(train.train)
+app.command()(report.report)
+app.command("list")(listing.list_everything)
+
+
+def main() -> None:
+    """Run the command; a mistake of the user's is one line on standard error and exit code 2."""
+    try:
+        app()
+    except (ArtdeGymError, GainError, gym.error.Error) as error:
+        typer.echo(f"artde-gym: {error}", err=True)
+        sys.exit(2)
+
+
+@app.callback(invoke_without_command=True)
+def version(
+    show: Annotated[bool, typer.Option("--version", help="Print the version and stop.")] = False,
+) -> None:
+    """Environments and judges of time-delay control."""
+    if show:
+        print(f"artde-gym {__version__}")
+        raise typer.Exit

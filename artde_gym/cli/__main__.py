@@ -1,0 +1,5 @@
+"""`python -m artde_gym.cli`."""
+
+from artde_gym.cli import main
+
+main()

@@ -1,0 +1,72 @@
+"""What several commands ask for: their options, each declared once, and how their text is read."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import os
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from artde_gym.errors import OptionError
+
+WALK = "BipedWalk-Payload-v0"
+ENGINES = ("bullet", "mujoco")
+
+Controllers = Annotated[str, typer.Option(help="Names, comma-separated; see `list`.")]
+Seed = Annotated[int, typer.Option(help="Seed of everything.")]
+Workers = Annotated[int | None, typer.Option(help="Processes. Default: all cores.")]
+Out = Annotated[Path | None, typer.Option(help="Results folder. Default: runs/<date and time>.")]
+Backend = Annotated[
+    str, typer.Option(help="single: an engine for each episode; batch: thousands at once, where there is a vector.")
+]
+Engine = Annotated[str | None, typer.Option(help=f"Physics engine: {' or '.join(ENGINES)}.")]
+Disturbances = Annotated[str | None, typer.Option(help="JSON, in place of those that belong to what is run.")]
+EnvKwargs = Annotated[str | None, typer.Option(help="JSON, arguments of the environment.")]
+Gains = Annotated[str | None, typer.Option(help='JSON, e.g. {"artde": {"gamma_0": 200}}.')]
+Report = Annotated[bool, typer.Option("--report", help="Write report.html, too.")]
+
+
+def names(text: str) -> list[str]:
+    """What a comma-separated list names."""
+    return [name.strip() for name in text.split(",")]
+
+
+def json_object(option: str, text: str | None) -> dict[str, Any]:
+    """A JSON object; empty where there is no text.
+
+    Raises:
+        OptionError: not a JSON object.
+    """
+    if text is None:
+        return {}
+    try:
+        value = json.loads(text)
+    except ValueError as error:
+        raise OptionError(option, text, f"a JSON object ({error})") from error
+    if not isinstance(value, dict):
+        raise OptionError(option, text, "a JSON object")
+    return value
+
+
+def optional_json(option: str, text: str | None) -> dict[str, Any] | None:
+    """A JSON object; None where there is no text, since an empty object says something."""
+    return None if text is None else json_object(option, text)
+
+
+def environment_kwargs(text: str | None, engine: str | None) -> dict[str, Any]:
+    """Arguments of the environment out of `--env-kwargs` and `--engine`."""
+    kwargs = json_object("--env-kwargs", text)
+    return kwargs if engine is None else {**kwargs, "engine": engine}
+
+
+def processes(workers: int | None) -> int:
+    """As many as were asked for, or all cores."""
+    return workers or os.cpu_count() or 1
+
+
+def folder_of(out: Path | None) -> Path:
+    """The results folder that was asked for, or one of this second."""
+    return out or Path("runs") / datetime.datetime.now().strftime("%Y-%m-%d-%H%M%S")

@@ -1,0 +1,50 @@
+"""Live progress on the console."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from artde_gym.evaluation.evaluate import Update
+
+
+class Display:
+    """Live progress of an evaluation: a bar of finished episodes, and how far the running ones are."""
+
+    def __init__(self, console: Console) -> None:
+        self._running: dict[tuple[str, str, str], float] = {}
+        self._what = "episodes"
+        self._progress = Progress(
+            TextColumn("{task.fields[what]}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            TextColumn("{task.description}"),
+            console=console,
+        )
+        self._bar = self._progress.add_task("", total=None, what="episodes")
+
+    def __enter__(self) -> Display:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._progress.live.is_started:
+            self._progress.update(self._bar, description="")
+            self._progress.stop()
+
+    def __call__(self, update: Update, what: str = "episodes") -> None:
+        self._progress.start()  # with the first news; an error before it leaves no empty bar
+        if what != self._what:
+            self._what = what
+            self._progress.reset(self._bar)  # a bar that was full once has stopped its clock
+        first, last = update.task.episodes[0], update.task.episodes[-1]
+        numbers = f"#{first}" if first == last else f"#{first}..{last}"
+        key = (update.task.cell.name, update.task.controller, numbers)
+        self._running[key] = update.time_s
+        if update.ended:
+            del self._running[key]
+        text = ", ".join(
+            f"{name} {controller} {numbers}: {time:.0f} s"
+            for (name, controller, numbers), time in self._running.items()
+        )
+        self._progress.update(self._bar, completed=update.finished, total=update.total, description=text, what=what)

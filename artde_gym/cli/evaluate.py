@@ -1,0 +1,92 @@
+"""`artde-gym evaluate`: controllers on the same seeded episodes."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from artde_gym.cli.arguments import (
+    WALK,
+    Backend,
+    Controllers,
+    Disturbances,
+    Engine,
+    EnvKwargs,
+    Gains,
+    Out,
+    Report,
+    Seed,
+    Workers,
+    environment_kwargs,
+    folder_of,
+    json_object,
+    names,
+    optional_json,
+    processes,
+)
+from artde_gym.cli.display import Display
+from artde_gym.cli.report import show_report
+from artde_gym.evaluation import evaluate as run_evaluation
+from artde_gym.evaluation.console import print_result
+
+MAIN_SCENARIOS = {WALK: "S1,S2,S1-L4,S2-L4", "QuadInfinity-Payload-v0": "Q1,Q1-calm,Q1-gale"}
+"""What is run in an environment where no scenario is named."""
+
+
+def evaluate(
+    controllers: Controllers = "tde,atde,artde",
+    scenario: Annotated[
+        str | None,
+        typer.Option(
+            help="Names, comma-separated; see `list`. Default: the environment's main ones, or its first in batches."
+        ),
+    ] = None,
+    env: Annotated[str | None, typer.Option(help=f"Environment id. Default: the scenarios', or {WALK}.")] = None,
+    episodes: Annotated[int, typer.Option(help="Seeded episodes of each controller in each scenario.")] = 3,
+    seed: Seed = 0,
+    workers: Workers = None,
+    out: Out = None,
+    backend: Backend = "single",
+    engine: Engine = None,
+    disturbances: Disturbances = None,
+    env_kwargs: EnvKwargs = None,
+    gains: Gains = None,
+    traced: Annotated[
+        int | None, typer.Option(help="Episodes that leave signals. Default: all of them; none in the batch backend.")
+    ] = None,
+    trace_hz: Annotated[float, typer.Option(help="Rate of stored signals; inf for all of them.")] = 100.0,
+    report: Report = False,
+) -> None:
+    """Compare controllers on the same seeded episodes and print them beside the thesis."""
+    if scenario is None:
+        env = env or WALK
+        scenario = MAIN_SCENARIOS.get(env)
+        if scenario is not None and backend == "batch":
+            scenario = scenario.split(",")[0]
+    kwargs = environment_kwargs(env_kwargs, engine)
+    folder = folder_of(out)
+    console = Console()
+    with Display(console) as display:
+        result = run_evaluation(
+            names(controllers),
+            env,
+            scenario=None if scenario is None else names(scenario),
+            episodes=episodes,
+            seed=seed,
+            workers=processes(workers),
+            out=folder,
+            disturbances=optional_json("--disturbances", disturbances),
+            env_kwargs=kwargs,
+            gains=json_object("--gains", gains),
+            backend=backend,  # pyright: ignore[reportArgumentType]  # checked there
+            traced=traced,
+            trace_hz=trace_hz,
+            on_progress=display,
+        )
+    print_result(result, console)
+    if report:
+        show_report(folder, console)
+    if not result.complete:
+        raise typer.Exit(130)

@@ -1,0 +1,73 @@
+"""`artde-gym reproduce`: the thesis' tables and claims."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import pandas as pd
+import typer
+from rich.console import Console
+
+from artde_gym.cli.arguments import ENGINES, Report, Seed, Workers, names, processes
+from artde_gym.cli.display import Display
+from artde_gym.cli.report import show_report
+from artde_gym.evaluation import reproduce as run_reproduction
+from artde_gym.evaluation.claims import confirm
+from artde_gym.evaluation.console import print_claims, print_result
+from artde_gym.evaluation.reproduce import ROBOTS, scenarios_of
+
+
+def reproduce(
+    robot: Annotated[str, typer.Option(help=f"{', '.join(ROBOTS)}, or all.")] = "all",
+    engine: Annotated[str, typer.Option(help=f"Physics engine: {', '.join(ENGINES)}, or both.")] = "bullet",
+    episodes: Annotated[int, typer.Option(help="Seeded episodes of each controller in each scenario.")] = 10,
+    scenario: Annotated[str | None, typer.Option(help="Names, comma-separated. Default: all of the robot.")] = None,
+    controllers: Annotated[str | None, typer.Option(help="Names, comma-separated. Default: the robot's own.")] = None,
+    ablation: Annotated[
+        bool, typer.Option(help="Run TDE at ARTDE's mean gain too; on a folder that is there, only what is new.")
+    ] = False,
+    seed: Seed = 0,
+    workers: Workers = None,
+    out: Annotated[
+        Path, typer.Option(help="Results folder, one inside for each engine and robot; the same call continues it.")
+    ] = Path("runs/reproduce"),
+    report: Report = False,
+) -> None:
+    """Run the thesis' scenarios and print its tables beside ours, then each of its claims with a verdict."""
+    robots = list(ROBOTS) if robot == "all" else [robot]
+    engines = list(ENGINES) if engine == "both" else [engine]
+    named = None if scenario is None else names(scenario)
+    console = Console()
+    for name in robots:
+        chosen = scenarios_of(name, named)
+        if not chosen:
+            continue
+        verdicts: dict[str, pd.DataFrame] = {}
+        for one in engines:
+            with Display(console) as display:
+                found = run_reproduction(
+                    name,
+                    out / one / name,
+                    scenarios=chosen,
+                    controllers=None if controllers is None else names(controllers),
+                    ablation=ablation,
+                    episodes=episodes,
+                    seed=seed,
+                    workers=processes(workers),
+                    engine=one,
+                    on_progress=lambda what, update, display=display: display(update, what),
+                )
+            if len(engines) > 1:
+                console.rule(f"{name} in {one}")
+            print_result(found.result, console)
+            print_claims(found.claims, console)
+            verdicts[one] = found.claims
+            if report and found.result.folder is not None:
+                show_report(found.result.folder, console)
+            if not found.result.complete:
+                raise typer.Exit(130)
+        if len(engines) > 1:
+            both = confirm(verdicts)
+            both.to_csv(out / f"claims-{name}.csv", index=False)
+            print_claims(both, console)

@@ -1,0 +1,68 @@
+"""`artde-gym train`: a residual on a controller."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from artde_gym.cli.arguments import Engine, EnvKwargs, Seed, environment_kwargs, json_object, processes
+from artde_gym.errors import OptionError
+
+
+def train(
+    env: Annotated[str, typer.Option(help="Environment id.")],
+    out: Annotated[Path, typer.Option(help="The run's folder; the same command continues an interrupted run.")],
+    base: Annotated[str, typer.Option(help="Controller under the residual; none: the agent gives the force.")] = "tde",
+    algo: Annotated[str, typer.Option(help="ppo, sac, or cma-es for the biped's linear balance law.")] = "ppo",
+    steps: Annotated[int, typer.Option(help="Decisions of the agent, all environments together.")] = 1_000_000,
+    seed: Seed = 0,
+    workers: Annotated[int | None, typer.Option(help="Processes of environments. Default: all cores.")] = None,
+    channel: Annotated[str, typer.Option(help="What an action means. Default: the robot's; see the model cards.")] = "",
+    limit: Annotated[float, typer.Option(help="Largest residual. Default: the channel's.")] = 0.0,
+    gated: Annotated[bool, typer.Option(help="Fade the biped's residual in by tilt and velocity error.")] = True,
+    patience: Annotated[int, typer.Option(help="Held-out tests without a better score that end the run.")] = 20,
+    test_every: Annotated[int, typer.Option(help="Intervals (or generations) between two held-out tests.")] = 4,
+    engine: Engine = None,
+    env_kwargs: EnvKwargs = None,
+    options: Annotated[str | None, typer.Option(help="JSON, arguments of the algorithm.")] = None,
+) -> None:
+    """Train a residual on a controller; killed at any moment, the same command continues from its last checkpoint."""
+    from baselines.recipe import Recipe  # torch is heavy, and may not be installed
+    from baselines.run import Progress as TrainingProgress
+    from baselines.run import Training
+    from baselines.tasks import task
+
+    kwargs = environment_kwargs(env_kwargs, engine)
+    training = Training(
+        env,
+        Recipe(task(env).robot, base, channel=channel, limit=limit, gated=gated),
+        algo=algo,
+        steps=steps,
+        seed=seed,
+        env_kwargs=kwargs,
+        options=json_object("--options", options),
+        workers=1 if task(env).batched else processes(workers),
+        patience=patience,
+        test_every=test_every,
+    )
+    try:
+        if algo == "cma-es":
+            from baselines.tune_balance import tune as go
+        else:
+            from baselines.train import train as go
+    except ModuleNotFoundError as error:
+        if error.name not in ("cmaes", "stable_baselines3", "torch", "tensorboard"):
+            raise
+        raise OptionError("algo", algo, "what is installed; pip install 'artde-gym[rl]'") from error
+    columns = (TextColumn("decisions"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, TextColumn("{task.description}")) as bar:
+        shown = bar.add_task("", total=steps)
+
+        def on_progress(news: TrainingProgress) -> None:
+            bar.update(shown, completed=news.steps, total=news.wanted, description=news.text)
+
+        policy = go(training, out, on_progress)
+    print(f"best policy: {policy}")

@@ -1,0 +1,69 @@
+"""`artde-gym tune`: gains, with the same budget for every controller."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from artde_gym.cli.arguments import (
+    WALK,
+    Backend,
+    Controllers,
+    Disturbances,
+    Engine,
+    EnvKwargs,
+    Out,
+    Seed,
+    Workers,
+    environment_kwargs,
+    folder_of,
+    names,
+    optional_json,
+    processes,
+)
+from artde_gym.cli.display import Display
+from artde_gym.evaluation import tune as run_tuning
+from artde_gym.evaluation.tune_console import print_tuning
+
+
+def tune(
+    controllers: Controllers = "tde,atde,artde",
+    scenario: Annotated[str | None, typer.Option(help="Name; see `list`. Default: none, with --env as it is.")] = None,
+    env: Annotated[str | None, typer.Option(help=f"Environment id. Default: the scenario's, or {WALK}.")] = None,
+    trials: Annotated[int, typer.Option(help="Sets of gains that each controller may try, its preset included.")] = 50,
+    episodes: Annotated[int, typer.Option(help="Seeded training episodes of each trial.")] = 4,
+    held_out: Annotated[
+        int, typer.Option(help="Seeded episodes of the comparison in the end, none of them seen.")
+    ] = 20,
+    seed: Seed = 0,
+    workers: Workers = None,
+    out: Out = None,
+    backend: Backend = "single",
+    engine: Engine = None,
+    disturbances: Disturbances = None,
+    env_kwargs: EnvKwargs = None,
+) -> None:
+    """Tune gains with the same budget for every controller; the same command continues an interrupted run."""
+    kwargs = environment_kwargs(env_kwargs, engine)
+    console = Console()
+    with Display(console) as display:
+        found = run_tuning(
+            names(controllers),
+            env,
+            scenario=scenario,
+            trials=trials,
+            episodes=episodes,
+            held_out=held_out,
+            seed=seed,
+            workers=processes(workers),
+            out=folder_of(out),
+            disturbances=optional_json("--disturbances", disturbances),
+            env_kwargs=kwargs,
+            backend=backend,  # pyright: ignore[reportArgumentType]  # checked there
+            on_progress=lambda what, update: display(update, what),
+        )
+    print_tuning(found, console)
+    if not found.complete:
+        raise typer.Exit(130)
