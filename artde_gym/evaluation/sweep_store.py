@@ -89,12 +89,12 @@ class SweepStore:
         run = {"sweep": json.loads(sweep), "provenance": provenance(), "complete": False}
         with self._writing():
             if self._lock is None:
+                self._clear(f".{RECORD}.*")
                 if claim(self.folder, RECORD, CONFIGURATION):
                     self._write_record()
                 self._take()
             self._check_software(run["provenance"])
-            for leftover in (*self.folder.glob(".part-*"), *self.folder.glob(f".{RECORD}.*")):
-                leftover.unlink()
+            self._clear(f".{RECORD}.*", ".part-*")
             (self.folder / "episodes").mkdir(exist_ok=True)
             for path in self.set_aside:
                 (self.folder / "corrupt").mkdir(exist_ok=True)
@@ -139,19 +139,19 @@ class SweepStore:
 
     def _take(self) -> None:
         """Lock the folder and read what is there."""
+        if _runs(self.folder) is None and not _parts(self.folder):
+            raise _unreadable(self.folder)
         with self._writing():
             self._lock = (self.folder / "sweep.lock").open("ab")
-            try:
-                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                self._lock.close()
-                allowed = "a folder that no other process writes: a sweep is running there"
-                raise StoreError("sweep folder", str(self.folder), allowed) from None
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            self._lock.close()
+            allowed = "a folder that no other process writes: a sweep is running there"
+            raise StoreError("sweep folder", str(self.folder), allowed) from None
         runs = _runs(self.folder)
-        if runs is None and not _parts(self.folder):
-            raise _unreadable(self.folder)
         if runs is None and (self.folder / RECORD).exists():
-            self.set_aside.append(self.folder / RECORD)  # parts tell all that is needed
+            self.set_aside.append(self.folder / RECORD)  # the parts tell all that is needed
         self._runs = runs or []
         for path in _parts(self.folder):
             try:
@@ -166,6 +166,12 @@ class SweepStore:
             self.done.update(keys)
             self._parts[path] = sweep_part.types_in(part)
             self._types = sweep_part.joined(self._types, self._parts[path])
+
+    def _clear(self, *patterns: str) -> None:
+        """Remove what a process was writing when it was killed."""
+        for pattern in patterns:
+            for path in self.folder.glob(pattern):
+                path.unlink()
 
     def _check_software(self, now: Mapping[str, Any]) -> None:
         """Episodes of one sweep are to be equal to the last bit, whenever they were run."""
