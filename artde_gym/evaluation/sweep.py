@@ -37,6 +37,9 @@ from artde_gym.evaluation.workers import Runs, run_here, run_parallel
 Executor = Literal["local", "ray"]
 """Processes of this machine, or a Ray cluster."""
 
+TRACE_HZ = 100.0
+"""`evaluate` has it where nothing else is asked for; policies are asked for what some metrics need at this rate."""
+
 OnProgress = Callable[[str, Update], None]
 
 
@@ -188,7 +191,7 @@ def _task(plan: Design, name: str, point: Point, episodes: list[int]) -> Task:
         point.gains,
         episodes,
         [episode_seed(point.seed, episode) for episode in episodes],
-        trace_hz=1.0,
+        TRACE_HZ,
         traced=0,
     )
 

@@ -54,12 +54,14 @@ def print_sweep(found: Sweep, console: Console) -> None:
 
 
 def _varied(episodes: Any) -> list[str]:
-    """Columns that tell the cells apart; disturbances by the values that are one in each cell."""
-    firsts = episodes.drop_duplicates("cell")
-    names = ["env", "scenario", "controller", *(name for name in episodes if name.startswith(_PREFIXES))]
-    differing = [name for name in names if firsts[name].nunique(dropna=False) > 1]
-    within = episodes.groupby("cell")[differing].nunique(dropna=False)
-    return [name for name in differing if (within[name] == 1).all()]
+    """Columns that tell the cells apart: names, then what varies beside them and is one value in each cell."""
+    names = [name for name in ("env", "scenario", "controller") if episodes[name].nunique() > 1]
+    if "scenario" in names and (episodes.groupby("scenario")["env"].nunique() == 1).all():
+        names = [name for name in names if name != "env"]
+    columns = [name for name in episodes if name.startswith(_PREFIXES)]
+    by_name = episodes.groupby(["env", "scenario", "controller"])[columns].nunique(dropna=False)
+    by_cell = episodes.groupby("cell")[columns].nunique(dropna=False)
+    return [*names, *(name for name in columns if (by_name[name] > 1).any() and (by_cell[name] == 1).all())]
 
 
 def _short(name: str) -> str:
