@@ -12,7 +12,6 @@ from artde_gym.evaluation.provenance import DECISIVE, versions
 from artde_gym.evaluation.workers import AHEAD, PATIENCE, Job, Runs, Work
 
 RETRIES = 3  # of a job whose worker or node is lost
-PATIENT_START = 120  # s; Ray's own 30 s are too few on a machine that has much to do
 STORE = 80 * 2**20  # bytes of shared memory for a cluster on this machine: results are a few kB
 
 
@@ -67,14 +66,13 @@ def _ray() -> Any:
 
 def _connect(ray: Any, address: str | None, workers: int) -> None:
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nobody is told what runs here, unless the user wants it
-    os.environ.setdefault("RAY_raylet_start_wait_time_s", str(PATIENT_START))
     own = {"num_cpus": workers, "object_store_memory": STORE, "include_dashboard": False} if address is None else {}
     try:
         ray.init(address or "local", log_to_driver=False, logging_level="ERROR", **own)
     except Exception as error:  # it raises these, too
         reason = " ".join(str(error).split())
         if address is None:
-            raise WorkerError("Ray", reason, "a machine on which it starts") from error
+            raise WorkerError("Ray", reason, "a machine on which it starts, within 30 s") from error
         raise OptionError("address", address, f"that of a running Ray cluster ({reason})") from error
 
 
