@@ -55,6 +55,10 @@ class Schedule:
         acting = any(push.first < end and first <= push.end for push in self._pushes)
         return not acting and not any(first <= step < end for step in self._changes)
 
+    def acting(self, step: int) -> list[Push]:
+        """The pushes that act during a step."""
+        return [push for push in self._pushes if push.first <= step < push.end]
+
     def apply(self, step: int, engine: Engine) -> list[str]:
         """Bring about what belongs to a step; returns what begins or ends with it, in words."""
         events = self._changes.get(step, [])
@@ -63,9 +67,8 @@ class Schedule:
                 self._attach(engine)
             elif event == "payload dropped":
                 engine.release_payload()
-        for push in self._pushes:
-            if push.first <= step < push.end:
-                engine.push(push.site, push.force)
+        for push in self.acting(step):
+            engine.push(push.site, push.force)
         return events
 
     def _attach(self, engine: Engine) -> None:

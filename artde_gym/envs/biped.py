@@ -20,6 +20,7 @@ from artde_gym.disturbances.schedule import Schedule
 from artde_gym.disturbances.sensing import Sensing
 from artde_gym.envs.documentation import filled
 from artde_gym.envs.options import disturbances_in, steps_per_period
+from artde_gym.envs.view import View
 from artde_gym.errors import ActionError, OptionError
 from artde_gym.layout import Field, Layout
 from artde_gym.references.walking import WalkingPattern, hip_height_above_ankle, walking_pattern
@@ -41,6 +42,9 @@ SETTLE_STIFFNESS = 420.0  # Nm/rad: what TDE at 1 ms has, Kd m_bar / L
 SETTLE_DAMPING = 10.0  # Nm s/rad
 BARE_DAMPING = 0.5  # Nm s/rad, likewise without rotors: held for a step, more than 2 M / TIME_STEP of a foot diverges
 MAX_SPEED = 200.0  # rad/s, bound of observed joint speeds
+
+CAMERA_HEIGHT = 0.42  # m, of what it looks at
+LEEWAY = 0.15  # m, that the robot may be off its pattern before the camera goes with it
 
 N_JOINTS = 12
 
@@ -145,6 +149,10 @@ walk.
 | `duration` | 58.0 | from 0.1 s | length of the walk |
 | `observe_ground_force` | False | False, True | append the ground's force on each foot to the observation |
 | `engine` | "bullet" | "bullet", "mujoco" | physics engine; see docs/engines.md |
+| `width`, `height` | 640, 480 | 16 to 4096 | pixels of a picture |
+
+With `render_mode="rgb_array"`, `render` draws 30 pictures a simulated second; asked more often, it gives the last one
+again. Words of your own in `env.unwrapped.view.caption` are written into each of them.
 
 `reset(options={{"disturbances": ..., "scenario": "S2"}})` replaces the disturbances of this and the following
 episodes, by a mapping or by those of a named scenario.
@@ -168,6 +176,7 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         speed: see `artde_gym.references.walking`, also for `step_duration` and `duration`.
         observe_ground_force: whether the observation ends with the ground's force on each foot.
         engine: physics engine.
+        width, height: of pictures (pixels).
         render_mode: "rgb_array" or None.
 
     Raises:
@@ -195,6 +204,8 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         duration: float = 58.0,
         observe_ground_force: bool = False,
         engine: EngineName = "bullet",
+        width: int = 640,
+        height: int = 480,
         render_mode: Literal["rgb_array"] | None = None,
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
@@ -208,6 +219,9 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         self._substeps = steps_per_period(control_period, TIME_STEP)
         self.control_period = self._substeps * TIME_STEP
         self._engine: Engine = make_engine(engine, model, TIME_STEP, renders=render_mode is not None)
+        camera = Camera((0.0, 0.0, CAMERA_HEIGHT), width=width, height=height)
+        self.view = View(self._engine, camera, self.control_period, share=1.0, slack=LEEWAY)
+        self.metadata = {**self.metadata, **self.view.metadata}
         self.pattern = walking_pattern(speed, step_duration, duration, TIME_STEP)
         self._plan = _plan(self.pattern, self._substeps)
         self._last = len(self._plan) - 1
@@ -224,6 +238,7 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         self._still = self._settle(start)
         self._settled = self._engine.snapshot()
         self._k = self._last  # no step before the first reset
+        self._state, self._schedule, self._realised = self._engine.read(), Schedule({}, TIME_STEP), {}
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
         """Start a walk; `options` are those of the class' documentation.
@@ -238,7 +253,9 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
             self._disturbances = self._parse(disturbances)
         realised = self._disturbances.draw(self.np_random)
         self._k = 0
+        self._realised = realised
         self._tau = self._begin(realised)
+        self.view.reset()
         info: dict[str, Any] = {"time_s": 0.0, "disturbances": realised}
         return self._measure(info), info
 
@@ -271,11 +288,14 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         return observation, reward, fall is not None, self._k >= self._last, info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """A picture of 640 x 480 from a camera that walks along; None without a render mode."""
+        """A picture from a camera that walks along; None without a render mode."""
         if self.render_mode is None:
             return None
-        x, y, _ = self._engine.read().position
-        return self._engine.render(Camera((x, y, 0.42)))
+        step = self._k * self._substeps
+        home = (float(self.pattern.base[step, 0]), 0.0, CAMERA_HEIGHT)
+        pushes = self._schedule.acting(step)
+        over = self._k >= self._last or self._fall() is not None
+        return self.view.picture(step * TIME_STEP, home, pushes, self._realised, over=over)
 
     def close(self) -> None:
         self._engine.close()

@@ -20,7 +20,9 @@ from artde_gym.arrays import Array
 from artde_gym.errors import RobotError
 from artde_gym.robots.mjcf import PAYLOAD, mjcf
 from artde_gym.robots.spec import RobotSpec, Vector
-from artde_gym.sim.engine import PAYLOAD_RADIUS, Camera, State
+from artde_gym.sim.camera import Camera
+from artde_gym.sim.engine import PAYLOAD_RADIUS, State
+from artde_gym.sim.ground import Shadow, paint
 from artde_gym.sim.mujoco_canvas import Canvas
 from artde_gym.sim.rotation import Quaternion, moved, rotated
 
@@ -71,6 +73,7 @@ class MujocoEngine:
         self._scratch = mj.MjData(model)
         self._snapshots: list[tuple[Array, Array, Array]] = []
         self._canvas = Canvas(model) if renders else None
+        self._shadow = Shadow(spec)
 
     def place(self, position: Vector, q: Array) -> None:
         self._remove_payload()
@@ -109,14 +112,17 @@ class MujocoEngine:
         self._pushed = True
 
     def push(self, site: str, force: Vector) -> None:
-        if site not in self._sites:
-            raise RobotError("site", site, ", ".join(map(repr, self._sites)))
-        data, number = self._data, self._sites[site]
-        mj.mj_kinematics(self._model, data)
-        body = self._model.site_bodyid[number]
-        arm = data.site_xpos[number] - data.xipos[body]
+        place, body = np.array(self.site(site)), self._model.site_bodyid[self._sites[site]]
+        arm = place - self._data.xipos[body]
         self._pushes[body] += (*force, *np.cross(arm, force))  # at the body's centre of mass
         self._pushed = True
+
+    def site(self, name: str) -> Vector:
+        if name not in self._sites:
+            raise RobotError("site", name, ", ".join(map(repr, self._sites)))
+        mj.mj_kinematics(self._model, self._data)
+        x, y, z = self._data.site_xpos[self._sites[name]].tolist()
+        return x, y, z
 
     def foot_loads(self) -> tuple[float, ...]:
         return tuple(self._forces[2::3].tolist())
@@ -183,7 +189,10 @@ class MujocoEngine:
             self._canvas = Canvas(self._model)
         mj.mj_kinematics(self._model, self._data)
         mj.mj_camlight(self._model, self._data)
-        return self._canvas.draw(self._data, camera, self._payload_center())
+        ball = self._payload_center()
+        picture, bare = self._canvas.draw(self._data, camera, ball)
+        paint(picture, bare, camera, self._shadow.polygons(self.read(), ball))
+        return picture
 
     def close(self) -> None:
         if self._canvas is not None:
