@@ -130,12 +130,12 @@ def evaluate(
         raise OptionError("traced", traced, "a whole number >= 0, or None")
     if traced is None:
         traced = episodes if backend == "single" else 0
-    named = _named(controllers)
+    named = named_controllers(controllers)
     gains = {name: dict(values) for name, values in (gains or {}).items()}
     for name in gains:
         if name not in named:
             raise UnknownNameError("gains", name, among(name, named))
-    cells = _cells(env_id, scenario, dict(env_kwargs or {}), disturbances)
+    cells = cells_of(env_id, scenario, dict(env_kwargs or {}), disturbances)
     _try_out(backend, cells, named, gains)
 
     store = None
@@ -216,7 +216,7 @@ def _chunks(episodes: int, size: int) -> list[range]:
     return [range(first, stop) for first, stop in itertools.pairwise(edges)]
 
 
-def _named(controllers: Any) -> dict[str, Policy | ControllerSpec]:
+def named_controllers(controllers: Any) -> dict[str, Policy | ControllerSpec]:
     """Controllers by the name under which they are listed, names replaced by what they stand for."""
     if isinstance(controllers, Mapping):
         pairs = list(controllers.items())
@@ -243,7 +243,7 @@ def _named(controllers: Any) -> dict[str, Policy | ControllerSpec]:
     return named
 
 
-def _cells(
+def cells_of(
     env_id: str | None,
     names: str | Sequence[str] | None,
     kwargs: dict[str, Any],
@@ -281,7 +281,7 @@ def _try_out(
         tracking_of(cell.env_id)
         env = _environment(backend, cell, 1)
         for name, item in named.items():
-            _policy(item, env, gains.get(name, {}))
+            policy_for(item, env, gains.get(name, {}))
 
 
 def _identity(item: Policy | ControllerSpec) -> str:
@@ -381,7 +381,7 @@ def _run_in_worker(index: int, task: Task) -> list[Episode]:
 
 def _run_task(task: Task, on_progress: Callable[[float], None]) -> list[Episode]:
     env = _environment(task.backend, task.cell, len(task.seeds))
-    policy = _policy(task.policy, env, task.gains)
+    policy = policy_for(task.policy, env, task.gains)
     options: dict[str, Any] = {"trace_hz": task.trace_hz, "phases": task.cell.phases, "on_progress": on_progress}
     if task.backend == "batch":
         return run_batch(env, policy, task.seeds, traced=task.traced, **options)
@@ -398,7 +398,7 @@ def _duration(results: list[Episode]) -> float:
     return max(result.row["duration_s"] for result in results)
 
 
-def _policy(item: Policy | ControllerSpec, env: Any, gains: dict[str, Any]) -> Policy:
+def policy_for(item: Policy | ControllerSpec, env: Any, gains: dict[str, Any]) -> Policy:
     if isinstance(item, ControllerSpec):
         register_spec(item)  # a worker knows only what this project registers itself
         return make_controller(item.name, env, **gains)

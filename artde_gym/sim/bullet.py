@@ -27,7 +27,7 @@ from artde_gym.errors import RobotError
 from artde_gym.robots.spec import RobotSpec, Vector
 from artde_gym.robots.urdf import urdf
 from artde_gym.sim.camera import FIELD_OF_VIEW, NEAR, Camera
-from artde_gym.sim.engine import PAYLOAD_COLOUR, PAYLOAD_RADIUS, State
+from artde_gym.sim.engine import PAYLOAD_COLOUR, PAYLOAD_LOOK, PAYLOAD_RADIUS, State
 from artde_gym.sim.ground import SUN, Shadow, paint
 from artde_gym.sim.rotation import Quaternion, moved, rotated
 
@@ -81,7 +81,11 @@ class BulletEngine:
         self._ground = self._build_ground()
         self._robot = self._build_robot()
         self._ball = bullet.createVisualShape(  # once: Bullet never frees a visual shape
-            bullet.GEOM_SPHERE, radius=PAYLOAD_RADIUS, rgbaColor=PAYLOAD_COLOUR, physicsClientId=self._client
+            bullet.GEOM_MESH,
+            fileName=str(Path(pybullet_data.getDataPath()) / "sphere_smooth.obj"),  # of radius 1
+            meshScale=[PAYLOAD_LOOK] * 3,
+            rgbaColor=PAYLOAD_COLOUR,
+            physicsClientId=self._client,
         )
         self._sites = {name: (link, offset) for name, link, offset in spec.sites}
         self._com = x, y, z = spec.base.com

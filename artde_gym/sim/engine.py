@@ -27,7 +27,8 @@ class State(NamedTuple):
     angular_velocity: Vector
 
 
-PAYLOAD_RADIUS = 0.08  # m, of the homogeneous ball that is the payload; it shows on either side of Ojas' torso
+PAYLOAD_RADIUS = 0.08  # m, of the homogeneous ball that is the payload
+PAYLOAD_LOOK = 0.09  # m, likewise in pictures, so that it shows on either side of Ojas' torso
 PAYLOAD_COLOUR = (0.85, 0.45, 0.1, 1.0)
 
 

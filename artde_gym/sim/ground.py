@@ -18,7 +18,7 @@ from artde_gym.arrays import Array
 from artde_gym.robots.dynamics import RigidBodyTree
 from artde_gym.robots.spec import RobotSpec, Vector
 from artde_gym.sim.camera import Camera
-from artde_gym.sim.engine import PAYLOAD_RADIUS, State
+from artde_gym.sim.engine import PAYLOAD_LOOK, State
 from artde_gym.sim.rotation import matrix
 
 SUN: Vector = (1.0, 1.5, 3.0)  # towards it
@@ -57,7 +57,7 @@ class Shadow:
         found = list(fallen[:, _FACES].reshape(-1, 4, 3))
         if ball is not None and ball[2] > 0:
             across, over = _beside(SUN)
-            edge = PAYLOAD_RADIUS * (np.cos(_ROUND)[:, None] * across + np.sin(_ROUND)[:, None] * over)
+            edge = PAYLOAD_LOOK * (np.cos(_ROUND)[:, None] * across + np.sin(_ROUND)[:, None] * over)
             found.append(_cast(ball + edge))
         return found
 

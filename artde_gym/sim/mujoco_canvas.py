@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from artde_gym.arrays import Array
 from artde_gym.errors import OptionError
 from artde_gym.sim.camera import Camera
-from artde_gym.sim.engine import PAYLOAD_COLOUR, PAYLOAD_RADIUS
+from artde_gym.sim.engine import PAYLOAD_COLOUR, PAYLOAD_LOOK
 
 mj: Any = mujoco  # compiled, without type information
 
@@ -56,8 +56,8 @@ class Canvas:
         eye.distance, eye.azimuth, eye.elevation = camera.distance, camera.yaw_deg + 90.0, -camera.pitch_deg
         everything = mj.mjtCatBit.mjCAT_ALL.value
         mj.mjv_updateScene(self._model, data, mj.MjvOption(), None, eye, everything, scene)
-        if ball is not None and ball[2] > -PAYLOAD_RADIUS:  # the ground, which would hide it, is not drawn
-            size, colour = np.full(3, PAYLOAD_RADIUS), np.array(PAYLOAD_COLOUR, dtype=np.float32)
+        if ball is not None and ball[2] > -PAYLOAD_LOOK:  # the ground, which would hide it, is not drawn
+            size, colour = np.full(3, PAYLOAD_LOOK), np.array(PAYLOAD_COLOUR, dtype=np.float32)
             shape = mj.mjtGeom.mjGEOM_SPHERE
             mj.mjv_initGeom(scene.geoms[scene.ngeom], shape, size, ball, np.eye(3).ravel(), colour)
             scene.ngeom += 1
