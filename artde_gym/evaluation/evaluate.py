@@ -249,6 +249,11 @@ def cells_of(
     kwargs: dict[str, Any],
     disturbances: Mapping[str, Any] | None,
 ) -> list[Cell]:
+    """Scenarios by name, or the environment as it is; arguments as of `evaluate`.
+
+    Raises:
+        UnknownNameError, OptionError: for a scenario or an environment that does not fit.
+    """
     if "disturbances" in kwargs:
         raise OptionError(
             "env_kwargs", "disturbances", "environment arguments; disturbances have an argument of their own"
@@ -399,6 +404,12 @@ def _duration(results: list[Episode]) -> float:
 
 
 def policy_for(item: Policy | ControllerSpec, env: Any, gains: dict[str, Any]) -> Policy:
+    """What drives an environment: a registered controller built for it, or the policy itself.
+
+    Raises:
+        OptionError: for gains of a policy.
+        GainError: for a bad gain.
+    """
     if isinstance(item, ControllerSpec):
         register_spec(item)  # a worker knows only what this project registers itself
         return make_controller(item.name, env, **gains)

@@ -37,13 +37,13 @@ def panels(shown: Mapping[str, Shot], title: str, columns: int) -> NDArray[np.ui
     _text(draw, (head // 3, head // 2), title, SOFT, head, 0.5, "lm", limit=size[0] - head // 2)
     for number, (name, shot) in enumerate(shown.items()):
         x, y = number % columns * (width + GAP), head + number // columns * (head + height + GAP)
-        _text(draw, (x + head // 3, y + head // 2), name, colours[name].colour, head, 0.68, "lm", stroke=0.4)
+        _text(draw, (x + head // 3, y + head // 2), name, colours[name].colour, head, 0.68, "lm", stroke=head / 100)
         picture = Image.fromarray(shot.picture)
         if shot.over:
             picture = ImageEnhance.Color(picture).enhance(0.25)
             said = f"fell at {shot.time_s:.2f} s" if shot.fall_reason else f"end, {shot.time_s:.1f} s"
             ink = FALLEN if shot.fall_reason else SOFT
-            _text(draw, (x + width - head // 3, y + head // 2), said, ink, head, 0.6, "rm", stroke=0.3)
+            _text(draw, (x + width - head // 3, y + head // 2), said, ink, head, 0.6, "rm", stroke=head / 150)
             if shot.fall_reason:
                 edge = max(2, width // 160)
                 ImageDraw.Draw(picture).rectangle((0, 0, width - 1, height - 1), None, FALLEN, edge)

@@ -64,9 +64,13 @@ def video(
             or ffmpeg is missing.
     """
     out = Path(out)
-    for name, value in {"start": start, "end": end - start, "speed": speed, "fps": fps}.items():
-        if not (value >= 0 if name == "start" else value > 0) or value == math.inf and name != "end":
-            raise OptionError(name, end if name == "end" else value, "a number > 0, the end after the start")
+    for name, value in {"speed": speed, "fps": fps}.items():
+        if not 0 < value < math.inf:
+            raise OptionError(name, value, "a finite number > 0")
+    if not 0 <= start < math.inf:
+        raise OptionError("start", start, "a finite number >= 0 (s)")
+    if not end > start:
+        raise OptionError("end", end, f"a number > the start, {start:g} (s)")
     if not (columns is None or (isinstance(columns, int) and columns >= 1)):
         raise OptionError("columns", columns, "a whole number >= 1")
     writer.check(out)

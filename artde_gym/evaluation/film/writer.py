@@ -20,7 +20,8 @@ CODECS: dict[str, list[str]] = {
     ".webm": ["-c:v", "libvpx-vp9", "-crf", "36", "-b:v", "0", "-cpu-used", "5", "-row-mt", "1", "-pix_fmt", "yuv420p"],
 }
 SUFFIXES = (*CODECS, ".gif", ".webp", ".png")
-COLOURS = 128  # of a GIF
+COLOURS = 192  # of a GIF
+SAMPLED = 12  # pictures that a GIF's palette is made of
 QUALITY = 75  # of a WebP
 
 
@@ -77,8 +78,11 @@ def _encode(out: Path, pictures: Iterator[Picture], fps: float) -> None:
 
 
 def _gif(out: Path, pictures: Iterator[Picture], fps: float) -> None:
-    first = Image.fromarray(next(pictures)).quantize(COLOURS, dither=Image.Dither.NONE)
-    rest = (Image.fromarray(picture).quantize(COLOURS, palette=first, dither=Image.Dither.NONE) for picture in pictures)
+    """With one palette for all pictures, so that still parts stay still: rare colours of any of them are in it."""
+    frames = [Image.fromarray(picture) for picture in pictures]
+    sample = np.concatenate([np.asarray(frame) for frame in frames[:: -(-len(frames) // SAMPLED)] + frames[-1:]])
+    palette = Image.fromarray(sample).quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
+    first, *rest = (frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
     first.save(out, save_all=True, append_images=rest, duration=1000 / fps, loop=0, optimize=True)
 
 
@@ -87,7 +91,7 @@ def _webp(out: Path, pictures: Iterator[Picture], fps: float) -> None:
     first.save(out, save_all=True, append_images=rest, duration=round(1000 / fps), loop=0, quality=QUALITY, method=4)
 
 
-def _png(out: Path, pictures: Iterator[Picture], fps: float) -> None:
+def _png(out: Path, pictures: Iterator[Picture], _fps: float) -> None:
     Image.fromarray(next(pictures)).save(out, optimize=True)
 
 
