@@ -32,12 +32,12 @@ class Schedule:
     """The timed disturbances of one episode, in physics steps of `time_step` (s)."""
 
     def __init__(self, realised: Mapping[str, Any], time_step: float) -> None:
+        self._time_step = time_step
         self._pushes = [Push.of(entry, time_step) for entry in realised.get("push", ())]
         self._payload: Mapping[str, Any] = realised.get("payload", {})
         self._changes: dict[int, list[str]] = {}
         for number, push in enumerate(self._pushes):
-            self._add(push.first, f"push {number} begins")
-            self._add(push.end, f"push {number} ends")
+            self._announce(number, push)
         if self._payload and self._payload["drop"] > self._payload["attach"]:
             if self._payload["attach"] > 0:
                 self._add(round(self._payload["attach"] / time_step), "payload attached")
@@ -47,6 +47,21 @@ class Schedule:
         """Bring about what is there before the first step."""
         if self._payload.get("attach") == 0 and self._payload["drop"] > 0:
             self._attach(engine)
+
+    def add(self, push: Push) -> None:
+        """One more push than was drawn."""
+        self._announce(len(self._pushes), push)
+        self._pushes.append(push)
+
+    def drop(self, step: int) -> bool:
+        """Drop the payload at a step instead of later; False if it is not there then."""
+        time = step * self._time_step
+        if not self._payload or not self._payload["attach"] <= time < self._payload["drop"]:
+            return False
+        self._changes[round(self._payload["drop"] / self._time_step)].remove("payload dropped")
+        self._payload = {**self._payload, "drop": time}
+        self._add(step, "payload dropped")
+        return True
 
     def quiet(self, first: int, end: int) -> bool:
         """Whether nothing acts, begins or ends from step `first` up to, not including, `end`."""
@@ -74,6 +89,10 @@ class Schedule:
     def _attach(self, engine: Engine) -> None:
         x, y, z = self._payload["position"]
         engine.attach_payload(self._payload["mass"], (x, y, z))
+
+    def _announce(self, number: int, push: Push) -> None:
+        self._add(push.first, f"push {number} begins")
+        self._add(push.end, f"push {number} ends")
 
     def _add(self, step: int, event: str) -> None:
         self._changes.setdefault(step, []).append(event)

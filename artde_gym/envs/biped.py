@@ -19,6 +19,7 @@ from artde_gym.disturbances.ground import LOADED, GrfPulse
 from artde_gym.disturbances.schedule import Schedule
 from artde_gym.disturbances.sensing import Sensing
 from artde_gym.envs.documentation import filled
+from artde_gym.envs.live import Live
 from artde_gym.envs.options import disturbances_in, steps_per_period
 from artde_gym.envs.view import View
 from artde_gym.errors import ActionError, OptionError
@@ -150,6 +151,7 @@ walk.
 | `observe_ground_force` | False | False, True | append the ground's force on each foot to the observation |
 | `engine` | "bullet" | "bullet", "mujoco" | physics engine; see docs/engines.md |
 | `width`, `height` | 640, 480 | 16 to 4096 | pixels of a picture |
+| `window` | False | False, True | a window of Bullet's own, on a display; see `artde-gym play` |
 
 With `render_mode="rgb_array"`, `render` draws 30 pictures a simulated second; asked more often, it gives the last one
 again. Words of your own in `env.unwrapped.view.caption` are written into each of them.
@@ -164,7 +166,7 @@ the grammar writes them); `events` when a push or a payload begins or ends; afte
 """Sections of a task's documentation that are the same for all; `{observation}` and `{default}` are filled in."""
 
 
-class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
+class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
     """What all tasks of Ojas share; a subclass says what disturbs the walk by default.
 
     Args:
@@ -177,6 +179,7 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         observe_ground_force: whether the observation ends with the ground's force on each foot.
         engine: physics engine.
         width, height: of pictures (pixels).
+        window: whether Bullet shows the robot in a window of its own.
         render_mode: "rgb_array" or None.
 
     Raises:
@@ -206,6 +209,7 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         engine: EngineName = "bullet",
         width: int = 640,
         height: int = 480,
+        window: bool = False,
         render_mode: Literal["rgb_array"] | None = None,
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
@@ -218,7 +222,7 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         self._settle_damping = BARE_DAMPING if actuator_inertia == "none" else SETTLE_DAMPING
         self._substeps = steps_per_period(control_period, TIME_STEP)
         self.control_period = self._substeps * TIME_STEP
-        self._engine: Engine = make_engine(engine, model, TIME_STEP, renders=render_mode is not None)
+        self._engine: Engine = make_engine(engine, model, TIME_STEP, renders=render_mode is not None, window=window)
         camera = Camera((0.0, 0.0, CAMERA_HEIGHT), width=width, height=height)
         self.view = View(self._engine, camera, self.control_period, share=1.0, slack=LEEWAY)
         self.metadata = {**self.metadata, **self.view.metadata}
@@ -291,7 +295,7 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         """A picture from a camera that walks along; None without a render mode."""
         if self.render_mode is None:
             return None
-        step = self._k * self._substeps
+        step = self._elapsed
         home = (float(self.pattern.base[step, 0]), 0.0, CAMERA_HEIGHT)
         pushes = self._schedule.acting(step)
         over = self._k >= self._last or self._fall() is not None
@@ -299,6 +303,10 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
 
     def close(self) -> None:
         self._engine.close()
+
+    @property
+    def _elapsed(self) -> int:
+        return self._k * self._substeps
 
     def _parse(self, disturbances: Mapping[str, Any]) -> Disturbances:
         return Disturbances.parse(disturbances, self._sites, self.nominal_robot.actuated, self.robot_name)

@@ -19,6 +19,7 @@ from artde_gym.disturbances.schedule import Schedule
 from artde_gym.disturbances.wind import GRID, Wind
 from artde_gym.envs import quadrotor_task as task
 from artde_gym.envs.documentation import filled
+from artde_gym.envs.live import Live
 from artde_gym.envs.options import disturbances_in, steps_per_period
 from artde_gym.envs.quadrotor_sensors import Measurement, Sensors
 from artde_gym.envs.view import View
@@ -42,7 +43,7 @@ _NO_JOINTS = np.zeros(0)
 
 
 @filled(shared=task.DOCUMENTATION)
-class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
+class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
     """A quadrotor flies an infinity-shaped path with a payload, drops it half-way, and flies the path once more.
 
     ## Description
@@ -53,6 +54,7 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
     {shared}
     | `engine` | "bullet" | "bullet", "mujoco" | physics engine; see docs/engines.md |
     | `width`, `height` | 640, 480 | 16 to 4096 | pixels of a picture |
+    | `window` | False | False, True | a window of Bullet's own, on a display; see `artde-gym play` |
 
     With `render_mode="rgb_array"`, `render` draws 30 pictures a simulated second; asked more often, it gives the last
     one again. Words of your own in `env.unwrapped.view.caption` are written into each of them.
@@ -89,6 +91,7 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         engine: EngineName = "bullet",
         width: int = 640,
         height: int = 480,
+        window: bool = False,
         render_mode: Literal["rgb_array"] | None = None,
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
@@ -106,7 +109,9 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         self.observation_space = task.OBSERVATION.box()
         self.action_space = task.ACTION.box()
         self._low, self._high = self.action_space.low, self.action_space.high
-        self._engine: Engine = make_engine(engine, self.nominal_robot, TIME_STEP, renders=render_mode is not None)
+        self._engine: Engine = make_engine(
+            engine, self.nominal_robot, TIME_STEP, renders=render_mode is not None, window=window
+        )
         self.view = View(self._engine, CAMERA._replace(width=width, height=height), self.control_period, SHARE, LEEWAY)
         self.metadata = {**self.metadata, **self.view.metadata}
         self._engine.place(START, _NO_JOINTS)
@@ -166,13 +171,17 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         """A picture of the whole path from a camera that flies half-way along; None without a render mode."""
         if self.render_mode is None:
             return None
-        step = self._k * self._ticks * STEPS
+        step = self._elapsed
         pushes = self._schedule.acting(step)
         path = self._plan[:, :3]
         return self.view.picture(step * TIME_STEP, CENTRE, pushes, self._realised, path=path, over=self._over)
 
     def close(self) -> None:
         self._engine.close()
+
+    @property
+    def _elapsed(self) -> int:
+        return self._k * self._ticks * STEPS
 
     def _begin(self, realised: Mapping[str, Any], keys: NDArray[np.uint64]) -> None:
         """Set an episode up: the vehicle at rest in balance."""

@@ -9,12 +9,9 @@ corrupts the first.
 
 from __future__ import annotations
 
-import contextlib
 import math
-import os
 import tempfile
 import weakref
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -29,23 +26,9 @@ from artde_gym.robots.urdf import urdf
 from artde_gym.sim.camera import FIELD_OF_VIEW, NEAR, Camera
 from artde_gym.sim.engine import PAYLOAD_COLOUR, PAYLOAD_LOOK, PAYLOAD_RADIUS, State
 from artde_gym.sim.ground import SUN, Shadow, paint
+from artde_gym.sim.quiet import bullet
 from artde_gym.sim.rotation import Quaternion, moved, rotated
-
-
-@contextlib.contextmanager
-def _silent_stderr() -> Iterator[None]:
-    saved, sink = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(sink, 2)
-        yield
-    finally:
-        os.dup2(saved, 2)
-        os.close(saved)
-        os.close(sink)
-
-
-with _silent_stderr():  # PyBullet's C code greets every process with its build time
-    import pybullet as bullet
+from artde_gym.sim.window import Window, require_window
 
 GEAR_ITERATIONS = 60  # of the solver; with 30, what is left over in the gears raises ARTDE's RMSE in S1 by a third
 BARE_ITERATIONS = 50  # without gears
@@ -60,14 +43,20 @@ _NO_JOINTS.flags.writeable = False
 
 
 class BulletEngine:
-    """One robot on a plane in a Bullet world of its own."""
+    """One robot on a plane in a Bullet world of its own.
 
-    def __init__(self, spec: RobotSpec, time_step: float = 0.001) -> None:
+    Raises:
+        OptionError: for a window where there can be none.
+    """
+
+    def __init__(self, spec: RobotSpec, time_step: float = 0.001, *, window: bool = False) -> None:
+        if window:
+            require_window()
         self.spec = spec = spec.with_rotor_links() if any(spec.armature) else spec
         self.time_step = time_step
-        self._client = bullet.connect(bullet.DIRECT)
+        self._client = bullet.connect(bullet.GUI if window else bullet.DIRECT)
         if self._client < 0:
-            raise RuntimeError("PyBullet gave no physics client: too many are open in this process")
+            raise RuntimeError("PyBullet gave no physics client: too many are open in this process, or a window is")
         self._finalizer = weakref.finalize(self, _disconnect, self._client)
         bullet.setTimeStep(time_step, physicsClientId=self._client)
         bullet.setGravity(0.0, 0.0, -9.81, physicsClientId=self._client)
@@ -78,6 +67,7 @@ class BulletEngine:
             enableFileCaching=0,
             physicsClientId=self._client,
         )
+        self.window = Window(self._client) if window else None
         self._ground = self._build_ground()
         self._robot = self._build_robot()
         self._ball = bullet.createVisualShape(  # once: Bullet never frees a visual shape
@@ -102,10 +92,10 @@ class BulletEngine:
         mesh = str(Path(pybullet_data.getDataPath()) / "plane100.obj")
         visual = bullet.createVisualShape(bullet.GEOM_MESH, fileName=mesh, physicsClientId=self._client)
         ground = bullet.createMultiBody(0.0, shape, visual, physicsClientId=self._client)
-        texture = bullet.loadTexture(
-            str(Path(pybullet_data.getDataPath()) / "checker_blue.png"), physicsClientId=self._client
-        )
-        bullet.changeVisualShape(ground, -1, textureUniqueId=texture, physicsClientId=self._client)
+        if self.window:  # pictures have a ground of their own
+            checks = str(Path(pybullet_data.getDataPath()) / "checker_blue.png")
+            texture = bullet.loadTexture(checks, physicsClientId=self._client)
+            bullet.changeVisualShape(ground, -1, textureUniqueId=texture, physicsClientId=self._client)
         bullet.changeDynamics(ground, -1, lateralFriction=1.0, restitution=0.0, physicsClientId=self._client)
         return ground
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,9 @@ class State(NamedTuple):
     angular_velocity: Vector
 
 
+if TYPE_CHECKING:  # it imports an engine
+    from artde_gym.sim.window import Window
+
 PAYLOAD_RADIUS = 0.08  # m, of the homogeneous ball that is the payload
 PAYLOAD_LOOK = 0.09  # m, likewise in pictures, so that it shows on either side of Ojas' torso
 PAYLOAD_COLOUR = (0.85, 0.45, 0.1, 1.0)
@@ -43,6 +46,7 @@ class Engine(Protocol):
 
     spec: RobotSpec
     time_step: float
+    window: Window | None
 
     def place(self, position: Vector, q: Array) -> None:
         """Put the upright robot with its base origin at `position` (m) and the joints at `q`, all at rest.

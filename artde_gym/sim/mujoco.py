@@ -51,6 +51,7 @@ class MujocoEngine:
             raise RobotError("gears", spec.gears, "none, rotors being armature; engine 'bullet' couples rotor links")
         self.spec = spec
         self.time_step = time_step
+        self.window = None
         self._model = model = mj.MjModel.from_xml_string(mjcf(spec))
         self._data = data = mj.MjData(model)
         model.opt.timestep = time_step

@@ -31,6 +31,7 @@ from artde_gym.registration import registered_controllers
 
 WIDTH = 320  # pixels, of a picture
 PANEL = 400  # pixels, of a controller in a video
+FPS = 20.0  # of a video
 QUALITY = 72  # of a picture as WebP
 BEFORE_FALL = (1.2, 0.8, 0.4, 0.2, 0.0)  # s
 BEFORE_EVENT, AFTER_EVENT = 0.1, (0.3, 0.8, 1.5)  # s
@@ -78,10 +79,10 @@ class Album:
     def _pictures(self, scenario: str) -> list[str]:
         number = self._number(scenario)
         figures, missed = [], []
-        for name in self._drawable(scenario):
+        for place, name in enumerate(self._drawable(scenario)):
             row = self._row(scenario, name, number)
             sights = _falling(name, row)
-            if name == self._leader(scenario):
+            if place == 0:  # the best one
                 sights = [*self._moving(scenario, name, row), *_events(name, row), *sights]
             if not sights:
                 continue
@@ -122,6 +123,7 @@ class Album:
                 start=start,
                 end=start + LENGTH,
                 width=PANEL,
+                fps=FPS,
                 columns=min(3, len(names)),
             )
             data = base64.b64encode(file.read_bytes()).decode()
@@ -163,15 +165,11 @@ class Album:
         return {str(key): value for key, value in self.run.result.rows(scenario, name).loc[number].items()}
 
     def _drawable(self, scenario: str) -> list[str]:
-        """Controllers that finished the episode and can be built by their name."""
+        """Controllers that finished the episode and can be built by their name, the best one first."""
         number, result = self._number(scenario), self.run.result
-        done = [name for name in result.controllers if number in result.rows(scenario, name).index]
+        order = ranking(result, scenario, metric_of(self.run.tracking(scenario)))
+        done = [name for name in order if number in result.rows(scenario, name).index]
         return [name for name in done if name in registered_controllers()]
-
-    def _leader(self, scenario: str) -> str:
-        drawable = self._drawable(scenario)
-        order = ranking(self.run.result, scenario, metric_of(self.run.tracking(scenario)))
-        return next(name for name in order if name in drawable)
 
 
 Row = Mapping[str, Any]
@@ -189,11 +187,16 @@ def _events(name: str, row: Row) -> list[Sight]:
     """Before, during and after each push and drop that the episode reached."""
     sights = []
     for event, (begin, end) in _spans(row).items():
-        strip = f"{event} at {begin:g} s under {name}"
+        strip = f"{event} at {begin:g} s{_force(row, event)} under {name}"
         times = {"before": begin - BEFORE_EVENT, "in the middle": (begin + end) / 2}
         times |= {f"{after:g} s after": end + after for after in AFTER_EVENT}
         sights += [Sight(strip, time, text) for text, time in times.items() if 0 <= time <= row["duration_s"]]
     return sights
+
+
+def _force(row: Row, event: str) -> str:
+    size, body = (row.get(f"disturbance.push.{event.removeprefix('push')}.{key}") for key in ("magnitude", "body"))
+    return "" if size is None else f" ({size:.3g} N on {str(body).replace('_', ' ')})"
 
 
 def _spans(row: Row) -> Mapping[str, Span]:
