@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,17 +12,22 @@ from artde_gym.robots.spec import RobotSpec, Vector
 from artde_gym.sim.engine import Engine
 
 
-class Live:
-    """A part of an environment: pushes and drops that its disturbances did not foresee, and its window, if it has one.
-
-    `_elapsed` is the number of physics steps since the reset.
-    """
+class Live(abc.ABC):
+    """A part of an environment: pushes and drops that its disturbances did not foresee, and its window, if it has one."""
 
     nominal_robot: RobotSpec
     _engine: Engine
-    _schedule: Schedule
     _realised: Mapping[str, Any]
-    _elapsed: int
+
+    @property
+    @abc.abstractmethod
+    def elapsed(self) -> int:
+        """Physics steps since the reset."""
+
+    @property
+    @abc.abstractmethod
+    def schedule(self) -> Schedule:
+        """What happens in this episode, and when."""
 
     def push(self, site: str, force: Vector, duration: float = 0.2) -> None:
         """Push at a site of the robot (N, world axes) from now on, for a while (s).
@@ -32,14 +38,14 @@ class Live:
         sites = [name for name, _, _ in self.nominal_robot.sites]
         if site not in sites:
             raise RobotError("site", site, ", ".join(map(repr, sites)))
-        first, steps = self._elapsed, max(1, round(duration / self._engine.time_step))
-        self._schedule.add(Push(site, force, first, first + steps))
+        first, steps = self.elapsed, max(1, round(duration / self._engine.time_step))
+        self.schedule.add(Push(site, force, first, first + steps))
 
     def drop_payload(self) -> bool:
         """Drop the payload now; False if there is none."""
-        dropped = self._schedule.drop(self._elapsed)
+        dropped = self.schedule.drop(self.elapsed)
         if dropped:
-            payload = {**self._realised["payload"], "drop": self._elapsed * self._engine.time_step}
+            payload = {**self._realised["payload"], "drop": self.elapsed * self._engine.time_step}
             self._realised = {**self._realised, "payload": payload}
         return dropped
 

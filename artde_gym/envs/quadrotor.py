@@ -171,7 +171,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         """A picture of the whole path from a camera that flies half-way along; None without a render mode."""
         if self.render_mode is None:
             return None
-        step = self._elapsed
+        step = self.elapsed
         pushes = self._schedule.acting(step)
         path = self._plan[:, :3]
         return self.view.picture(step * TIME_STEP, CENTRE, pushes, self._realised, path=path, over=self._over)
@@ -180,8 +180,12 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self._engine.close()
 
     @property
-    def _elapsed(self) -> int:
+    def elapsed(self) -> int:
         return self._k * self._ticks * STEPS
+
+    @property
+    def schedule(self) -> Schedule:
+        return self._schedule
 
     def _begin(self, realised: Mapping[str, Any], keys: NDArray[np.uint64]) -> None:
         """Set an episode up: the vehicle at rest in balance."""

@@ -125,7 +125,8 @@ def _arrow(picture: Image.Image, camera: Camera, point: Vector, force: Vector) -
     if size == 0.0:
         return
     length = float(np.clip(METRES_PER_NEWTON * size, *ARROW))
-    tail, tip = camera.pixels([np.asarray(point) - length * np.asarray(force) / size, point])
+    end = np.asarray(point)
+    tail, tip = camera.pixels([end - length * np.asarray(force) / size, end])
     along = tip - tail
     seen = float(np.linalg.norm(along))
     if not seen > 1.0:

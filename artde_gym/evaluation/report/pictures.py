@@ -159,7 +159,7 @@ class Album:
     def _number(self, scenario: str) -> int:
         """The episode that the report's plots show, or the first one."""
         shown = self.run.episode(scenario)
-        return shown.number if shown else int(self.run.result.episodes["episode"].min())
+        return shown.number if shown else min(self.run.result.episodes["episode"].tolist())
 
     def _row(self, scenario: str, name: str, number: int) -> Row:
         return {str(key): value for key, value in self.run.result.rows(scenario, name).loc[number].items()}
