@@ -27,6 +27,10 @@ Disturbances = Annotated[str | None, typer.Option(help="JSON, in place of those 
 EnvKwargs = Annotated[str | None, typer.Option(help="JSON, arguments of the environment.")]
 Gains = Annotated[str | None, typer.Option(help='JSON, e.g. {"artde": {"gamma_0": 200}}.')]
 Report = Annotated[bool, typer.Option("--report", help="Write report.html, too.")]
+Pictures = Annotated[
+    bool, typer.Option("--pictures", help="Report with pictures of the motion, pushes and falls; runs them once more.")
+]
+Videos = Annotated[bool, typer.Option("--videos", help="Report with a video of each scenario (needs ffmpeg).")]
 
 
 def names(text: str) -> list[str]:

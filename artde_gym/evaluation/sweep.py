@@ -24,7 +24,7 @@ from artde_gym.evaluation.evaluate import (
     duration_of,
     episode_seed,
     labels_of,
-    policy_of,
+    policy_for,
     run_task,
     tried,
 )
@@ -162,7 +162,7 @@ def _check(plan: Design, points: Mapping[str, Point], done: set[Key], report: On
     for i, (name, point) in enumerate(fresh, start=1):
         if _place(point) != last:
             last, env = _place(point), tried(plan.backend, point.cell)
-        policy_of(point.spec, env, point.gains)
+        policy_for(point.spec, env, point.gains)
         report("cells checked", Update(_task(plan, name, point, [0]), 0.0, True, i, len(fresh)))
 
 

@@ -10,7 +10,7 @@ fall is the formula of free fall.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -18,10 +18,15 @@ from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
 from artde_gym.robots.spec import RobotSpec, Vector
-from artde_gym.sim.engine import Camera, State
+from artde_gym.sim.camera import Camera
+from artde_gym.sim.engine import State
+from artde_gym.sim.ground import Shadow, paint
 from artde_gym.sim.mujoco_canvas import Canvas
 from artde_gym.sim.mujoco_world import STATE, Blueprint, Fields, MujocoWorld
 from artde_gym.sim.rotation import Quaternion, moved, rotated
+
+if TYPE_CHECKING:  # it is the other engine's
+    from artde_gym.sim.window import Window
 
 mj: Any = mujoco  # compiled, without type information
 
@@ -43,6 +48,7 @@ class MujocoEngine(MujocoWorld):
 
     def __init__(self, spec: RobotSpec, time_step: float = 0.001, *, renders: bool = False) -> None:
         blueprint = Blueprint(spec, time_step)
+        self.window: Window | None = None
         self.time_step = time_step
         self._model = model = blueprint.model
         self._data = data = mj.MjData(model)
@@ -60,6 +66,7 @@ class MujocoEngine(MujocoWorld):
         self._scratch = mj.MjData(model)
         self._snapshots: list[tuple[Array, Array, Array]] = []
         self._canvas = Canvas(model) if renders else None
+        self._shadow = Shadow(spec)
 
     def place(self, position: Vector, q: Array) -> None:
         self._remove_payload()
@@ -143,7 +150,10 @@ class MujocoEngine(MujocoWorld):
         if self._canvas is None:
             self._canvas = Canvas(self._model)
         mj.mj_camlight(self._model, self.placed())
-        return self._canvas.draw(self._data, camera, self._payload_center())
+        ball = self._payload_center()
+        picture, bare = self._canvas.draw(self._data, camera, ball)
+        paint(picture, bare, camera, self._shadow.polygons(self.read(), ball))
+        return picture
 
     def close(self) -> None:
         if self._canvas is not None:

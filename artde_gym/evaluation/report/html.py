@@ -75,15 +75,17 @@ def table(caption: str, columns: Sequence[str], rows: Iterable[Sequence[str | Ce
     )
 
 
-def figure(caption: str, charts: Mapping[str, str], legend: Mapping[str, Look] | None = None) -> str:
-    """Charts by their heads, side by side where there is room, under one legend."""
+def figure(
+    caption: str, charts: Mapping[str, str], legend: Mapping[str, Look] | None = None, *, kind: str = "charts"
+) -> str:
+    """Charts by their heads, side by side where there is room, under one legend; or "shots", or a "film"."""
     drawn = "".join(
         f'<div class="chart">{f"<h4>{escape(head)}</h4>" if head else ""}{svg}</div>' for head, svg in charts.items()
     )
     keys = "".join(_key(name, look) for name, look in (legend or {}).items())
     return (
         f"<figure><figcaption>{escape(caption)}</figcaption>{f'<p class=legend>{keys}</p>' if keys else ''}"
-        f'<div class="charts">{drawn}</div></figure>'
+        f'<div class="{kind}">{drawn}</div></figure>'
     )
 
 
