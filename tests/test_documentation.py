@@ -1,0 +1,184 @@
+"""Documentation that is true: its code runs, its commands parse, its notebooks execute, its site builds and holds."""
+
+from __future__ import annotations
+
+import html.parser
+import os
+import subprocess
+import sys
+from pathlib import Path
+from urllib.parse import unquote, urldefrag
+
+import nbformat
+import pytest
+import typer.main
+from documentation.blocks import Block, blocks, commands, script
+from documentation.notebooks import NOTEBOOKS, notebook
+from documentation.pages import ROOT, generated
+from nbclient import NotebookClient
+
+from artde_gym.cli import app
+
+DOCS = ROOT / "docs"
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGES = {
+    **{str(page.relative_to(DOCS)): page.read_text(encoding="utf-8") for page in sorted(DOCS.rglob("*.md"))},
+    **generated(),
+}
+COMMANDS = {" ".join(words): words for text in (README, *PAGES.values()) for words in commands(text)}
+
+
+def scripts() -> dict[str, str]:
+    """All blocks of a page as one script, in their order; those of the README one by one, as it shows them."""
+    found = {f"README-{number}": script([part]) for number, part in enumerate(blocks(README))}
+    found |= {name: script(blocks(text)) for name, text in PAGES.items()}
+    return {name: text for name, text in found.items() if text}
+
+
+SCRIPTS = scripts()
+
+
+def run(text: str, folder: Path) -> None:
+    """A script in a folder of its own, with the `artde-gym` of this interpreter; warnings are errors."""
+    file = folder / "example.py"
+    file.write_text(text, encoding="utf-8")
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    environment = {**os.environ, "PATH": path, "MPLBACKEND": "agg", "COLUMNS": "120"}
+    outcome = subprocess.run(
+        [sys.executable, "-W", "error", str(file)],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+        cwd=folder,
+        env=environment,
+    )
+    assert outcome.returncode == 0, f"{outcome.stdout[-2000:]}\n{outcome.stderr[-4000:]}"
+
+
+def test_a_page_is_taken_apart_and_put_together():
+    page = (
+        "Words.\n\n```python\nx = 1\n```\n\n<!-- not run: slow -->\n```sh\nartde-gym list\n```\n"
+        "`artde-gym tune --trials\n3` and\n\n    artde-gym report a \\\n        --x\n\n```text\nout\n```\n"
+    )
+    parts = blocks(page)
+    assert [part.language for part in parts] == ["markdown", "python", "markdown", "sh", "markdown", "text", "markdown"]
+    assert parts[3] == Block("sh", "artde-gym list\n", "slow")
+    assert script(parts) == "x = 1\n"
+    assert commands(page) == [["list"], ["report", "a", "--x"], ["tune", "--trials", "3"]]
+
+
+def test_a_failing_command_fails_its_script(tmp_path):
+    with pytest.raises(AssertionError):
+        run(script([Block("sh", "false | cat\n")]), tmp_path)
+
+
+def test_there_is_enough_to_run():
+    assert len([name for name in SCRIPTS if name.startswith("README")]) >= 3
+    assert len([name for name in SCRIPTS if name.startswith("tutorials")]) >= 5
+    assert len(COMMANDS) >= 10
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_code_runs(name, tmp_path):
+    run(SCRIPTS[name], tmp_path)
+
+
+@pytest.mark.parametrize("words", COMMANDS.values(), ids=COMMANDS)
+def test_command_parses(words):
+    """By the real command line, up to where it would begin to work; a lone name only has to be a command's."""
+    whole = typer.main.get_command(app)
+    name, command, rest = whole.resolve_command(whole.make_context("artde-gym", list(words), resilient_parsing=True), list(words))
+    assert command is not None
+    if rest:
+        command.make_context(name, rest)
+
+
+@pytest.mark.parametrize("page", NOTEBOOKS)
+def test_notebook_executes(page, tmp_path):
+    made = nbformat.reads(notebook(DOCS / page), as_version=4)
+    nbformat.validate(made)
+    kernel = {"metadata": {"path": str(tmp_path)}}
+    NotebookClient(made, timeout=300, kernel_name="python3", resources=kernel).execute()
+    outputs = [output for cell in made.cells if cell.cell_type == "code" for output in cell.outputs]
+    assert any(output.output_type == "display_data" for output in outputs) or "own" in page
+    assert [output for output in outputs if output.output_type == "error"] == []
+
+
+class Links(html.parser.HTMLParser):
+    """What a page refers to, and the anchors that it has."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.targets: list[str] = []
+        self.anchors: set[str] = set()
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        for name, value in attrs:
+            if name in ("href", "src") and value:
+                self.targets.append(value)
+            elif name in ("id", "name") and value:
+                self.anchors.add(value)
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(folder)]
+    environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
+    outcome = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT, env=environment)
+    assert outcome.returncode == 0, outcome.stderr[-4000:]
+    return folder
+
+
+def test_every_link_of_the_site_leads_somewhere(site):
+    pages = {path: Links(path.read_text(encoding="utf-8")) for path in site.rglob("*.html")}
+    assert len(pages) > 20
+    for path, page in pages.items():
+        for target in page.targets:
+            if target.startswith(("http:", "https:", "data:", "mailto:", "javascript:")):
+                continue
+            place, anchor = urldefrag(target)
+            there = (path.parent / unquote(place)).resolve() if place else path
+            assert there.exists(), f"{path.relative_to(site)}: {target}"
+            if anchor and there in pages and not anchor.startswith("__"):
+                assert unquote(anchor) in pages[there].anchors, f"{path.relative_to(site)}: {target}"
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("width", [375, 1280])
+@pytest.mark.parametrize("page", ["index", "laws/artde", "environments/BipedWalk-Payload-v0", "tutorials/first-run"])
+def test_page_needs_no_network_and_fits(browser, site, page, width):
+    browser.errors.clear()
+    browser.open(site / f"{page}.html", width)
+    assert browser.errors == []
+    assert browser.run("document.documentElement.scrollWidth") <= width
+    assert browser.run("[...document.images].every((image) => image.complete && image.naturalWidth > 0)")
+
+
+@pytest.mark.browser
+def test_formulas_and_charts_are_drawn(browser, site):
+    browser.open(site / "laws/artde.html")
+    browser.run("document.fonts.ready.then(() => true)")
+    assert browser.run("document.fonts.check('16px mathematics')")
+    fraction = "document.querySelector('math[display=block] mfrac').getBoundingClientRect()"
+    assert browser.run(f"{fraction}.height") > 25
+    assert "\\(" not in browser.run("document.querySelector('article').innerText")
+    charts = "[...document.querySelectorAll('.chart svg')].map((chart) => chart.getBoundingClientRect().width)"
+    assert min(browser.run(charts)) > 200
+
+
+@pytest.mark.browser
+def test_search_finds_a_word_without_a_server(browser, site):
+    browser.errors.clear()
+    browser.open(site / "index.html")
+    browser.run("document.querySelector('[data-md-component=search-query]').focus()")
+    browser.run(
+        "(() => { const box = document.querySelector('[data-md-component=search-query]');"
+        " box.value = 'ratchet'; box.dispatchEvent(new Event('keyup', {bubbles: true})); })()"
+    )
+    hit = "document.querySelector('.md-search-result__link')?.href ?? ''"
+    wait = f"new Promise((done) => {{ const look = () => {hit} ? done({hit}) : setTimeout(look, 50); look(); }})"
+    assert "artde" in browser.run(wait) or "deviations" in browser.run(hit)
+    assert browser.errors == []
