@@ -6,12 +6,11 @@ import re
 from pathlib import Path
 from typing import Any
 
-from mkdocs.structure.files import File
-
 from documentation.figures import FIGURES
 from documentation.mathematics import font, mathml, symbols
 from documentation.notebooks import NOTEBOOKS, notebook
 from documentation.pages import ROOT, cards, generated
+from mkdocs.structure.files import File
 
 CHART_STYLE = ROOT / "artde_gym/evaluation/report/assets/chart.css"
 
@@ -35,8 +34,11 @@ def on_files(files: Any, config: Any) -> None:
         files.append(File.generated(config, path, content=content))
 
 
-def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Put in what a page asks for: `<!-- figure: NAME -->`, `<!-- source: PATH -->`."""
+def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
+    """Put in what a page asks for, `<!-- figure: NAME -->` or `<!-- source: PATH -->`, and the link to its notebook."""
+    if page.file.src_uri in NOTEBOOKS:
+        title, rest = markdown.split("\n", 1)
+        markdown = f"{title}\n\n[This page as a notebook]({Path(page.file.src_uri).stem}.ipynb)\n{rest}"
     markdown = re.sub(r"<!-- figure: (\S+) -->", lambda found: FIGURES[found[1]](), markdown)
     return re.sub(r"<!-- source: (\S+) -->", lambda found: _source(found[1]), markdown)
 

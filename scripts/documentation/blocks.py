@@ -38,7 +38,9 @@ def script(parts: list[Block]) -> str:
         if part.language == "python" and not part.reason:
             lines.append(part.text)
         elif part.language == "sh" and not part.reason:
-            lines.append(f"__import__('subprocess').run(['bash', '-euo', 'pipefail', '-c', {part.text!r}], check=True)\n")
+            lines.append(
+                f"__import__('subprocess').run(['bash', '-euo', 'pipefail', '-c', {part.text!r}], check=True)\n"
+            )
     return "\n".join(lines)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from artde_gym.arrays import Array
-from artde_gym.evaluation.palette import Look, looks
+from artde_gym.evaluation.palette import looks
 from artde_gym.evaluation.report.chart import Axis, Chart
 from artde_gym.evaluation.report.diagram import cascade, joint_loop
 from artde_gym.evaluation.report.html import figure
@@ -40,15 +40,16 @@ def tde() -> str:
     runs = {"tde": arm("tde"), "feedback alone": simulate(LAWS["positional-pid"].law, feedback, ARM, ARM_PERIOD)}
     periods = {f"L = {1e3 * period:g} ms": arm("tde", period=period) for period in (0.001, 0.002, 0.004)}
     charts = {
-        "with and without the estimate": over_time("|e| (deg)", {name: size(run) for name, run in runs.items()}, log=True),
+        "with and without the estimate": over_time(
+            "|e| (deg)", {name: size(run) for name, run in runs.items()}, log=True
+        ),
         "error and sampling period": over_time("e (deg)", {name: error(run) for name, run in periods.items()}),
         "when it converges": _validity(),
     }
     caption = (
-        f"An arm under TDE at the biped's gains (m_bar = 0.042 kg m^2, Kp = 25, Kd = 10). At {LOADED:g} s it is given a "
-        f"load, at {PUSHED[0]:g} s a push; the law is told of neither. RMS error {_values(runs)}; {_values(periods)}. "
-        "Right: the inertia varied, with a torque limit that keeps what diverges finite; from m_bar / M = 2 on the "
-        "estimate of one sample contradicts that of the next."
+        f"{_arm()} Feedback alone is m_bar u on top of the torque that held the arm at the start. RMS error "
+        f"{_values(runs)}; {_values(periods)}. Last chart: the inertia varied, with a torque limit that keeps what "
+        "diverges finite; from m_bar / M = 2 on the estimate of one sample contradicts that of the next."
     )
     return figure(caption, charts, looks([*runs, *periods])) + joint_loop()
 
@@ -109,21 +110,25 @@ def pid() -> str:
             "difference (1e-15 Nm)", {"pid": (runs["pid"].time, 1e15 * apart)}
         ),
     }
-    caption = f"{_arm()} The two lines of the left chart lie on each other: at most {np.abs(apart).max():.1e} Nm are between them."
+    caption = (
+        f"{_arm()} The two errors lie on each other: at most {np.abs(apart).max():.1e} Nm are between the torques."
+    )
     return figure(caption, charts, looks(runs))
 
 
 def positional_pid() -> str:
     runs = {"pid": lift("positional-pid", "pid", "tuned"), "tde": lift("tde")}
-    needed = LIFT.load_weight / LIFT.inertia
+    needed = LIFT.load_weight / float(LIFT.inertia)
     learnt, time = runs["pid"].inside["integral"][:, 0], runs["pid"].time
     charts = {
         "error": over_time("e (mm)", {name: error(run) for name, run in runs.items()}),
-        "what the integral has learnt": over_time("integral (m/s^2)", {"pid": (time, learnt - learnt[0])}, level=needed),
+        "what the integral has learnt": over_time(
+            "integral (m/s^2)", {"pid": (time, learnt - learnt[0])}, level=needed
+        ),
     }
     caption = (
-        f"{_lift()} RMS error {_values(runs)}; PID at its tuned gains, TDE at the thesis'. The integral has to learn the "
-        f"load's weight over the nominal mass, {needed:.2f} m/s^2 (dashed)."
+        f"{_lift()} RMS error {_values(runs)}; PID at its tuned gains, TDE at the thesis'. What the integral has to "
+        f"learn is the load's weight over the nominal mass, {needed:.2f} m/s^2 (dashed)."
     )
     return figure(caption, charts, looks(runs))
 
@@ -131,7 +136,7 @@ def positional_pid() -> str:
 def asmc() -> str:
     runs = {"asmc": lift("asmc"), "tde": lift("tde")}
     ratio = inside(runs["asmc"], "r")
-    true = (LIFT.inertia + LIFT.load) / LIFT.inertia
+    true = 1.0 + LIFT.load / float(LIFT.inertia)
     charts = {
         "error": over_time("e (mm)", {name: error(run) for name, run in runs.items()}),
         "switching gain c": over_time("c (m/s^2)", {"asmc": inside(runs["asmc"], "c")}),
@@ -150,8 +155,8 @@ def indi() -> str:
         "force": over_time("force (N)", {name: (run.time, run.tau[:, 0]) for name, run in runs.items()}),
     }
     caption = (
-        f"{_lift()} The measured velocity has noise of {100 * NOISE:g} cm/s. RMS error {_values(runs)}, and without noise "
-        f"{_values(calm)}; standard deviation of the force's change from sample to sample: {rough}."
+        f"{_lift()} The measured velocity has noise of {100 * NOISE:g} cm/s. RMS error {_values(runs)}, and without "
+        f"noise {_values(calm)}; standard deviation of the force's change from sample to sample: {rough}."
     )
     return figure(caption, charts, looks(runs))
 
@@ -206,12 +211,14 @@ def geometric() -> str:
         fall.line(time, column, shown[name], text=name)
     sweep = np.linspace(0.0, math.pi, 181)
     sizes = np.linalg.norm(_attitude_error(_turned(sweep[:, None] * axis)), axis=-1)
-    law = Chart("Size of the attitude error over the angle", Axis("angle (deg)", 0.0, 180.0), Axis("|e_q| (rad)", 0.0, 1.1))
+    law = Chart(
+        "Size of the attitude error over the angle", Axis("angle (deg)", 0.0, 180.0), Axis("|e_q| (rad)", 0.0, 1.1)
+    )
     law.line(np.degrees(sweep), sizes, looks(["geometric"])["geometric"])
     caption = (
-        "A rigid body with the quadrotor's inertia and the geometric controller's attitude gains turns back to level from "
-        "four tilts about a skew axis. The error is the sine of the angle: it is largest at 90 degrees and vanishes "
-        "upside down, where the body therefore lingers."
+        "A rigid body with the quadrotor's inertia and the geometric controller's attitude gains turns back to level "
+        "from four tilts about a skew axis. The error is the sine of the angle: it is largest at 90 degrees and "
+        "vanishes upside down, where the body therefore lingers."
     )
     return figure(caption, {"angle": fall.svg(), "error": law.svg()}, shown) + cascade()
 
@@ -287,7 +294,9 @@ def _validity() -> str:
     plants = dataclasses.replace(ARM, inertia=(0.042 / RATIOS)[:, None], load=0.0, load_weight=0.0)
     run = simulate(LAWS["tde"].law, gains_of("ojas", "tde"), plants, ARM_PERIOD)
     rms = np.degrees(np.sqrt(np.mean(run.e[..., 0] ** 2, axis=0)))
-    chart = Chart("RMS error over m_bar / M", Axis("m_bar / M (1)", 0.0, 2.5), Axis.of("RMS error (deg)", rms, log=True))
+    chart = Chart(
+        "RMS error over m_bar / M", Axis("m_bar / M (1)", 0.0, 2.5), Axis.of("RMS error (deg)", rms, log=True)
+    )
     chart.event(2.0, 2.5, "diverges")
     chart.line(RATIOS, rms, looks(["tde"])["tde"])
     return chart.svg()
@@ -330,6 +339,6 @@ def _arm() -> str:
 
 def _lift() -> str:
     return (
-        f"The quadrotor's vertical axis at the gains of its position loop, L = {1e3 * LIFT_PERIOD:g} ms. At {LOADED:g} s "
-        f"it is given a load, at {PUSHED[0]:g} s a push; the law is told of neither."
+        f"The quadrotor's vertical axis at the gains of its position loop, L = {1e3 * LIFT_PERIOD:g} ms. At "
+        f"{LOADED:g} s it is given a load, at {PUSHED[0]:g} s a push; the law is told of neither."
     )

@@ -6,6 +6,7 @@ import inspect
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import gymnasium as gym
 from gymnasium.envs.registration import load_env_creator
@@ -67,9 +68,11 @@ def environment(env_id: str) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def _page(documented: type) -> str:
+def _page(documented: Any) -> str:
     text = inspect.cleandoc(str(documented.__doc__))
-    text = RAISES.sub(lambda found: "## Errors\n\n" + re.sub(r"^ +(\w+):", r"- `\1`:", found[1], flags=re.MULTILINE), text)
+    text = RAISES.sub(
+        lambda found: "## Errors\n\n" + re.sub(r"^ +(\w+):", r"- `\1`:", found[1], flags=re.MULTILINE), text
+    )
     return re.sub(r"\bdocs/(\w+)\.md\b", r"[\1](../\1.md)", text)
 
 

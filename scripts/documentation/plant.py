@@ -77,12 +77,9 @@ def simulate(law: Law, gains: Any, plant: Plant, period: float, *, duration: flo
     tau = _weight(plant, q, 0.0)
     errors, forces, inside, memory = [], [], [], None
     for t in time.tolist():
-        signals = Signals(
-            q,
-            qd + noise * generator.standard_normal(qd.shape),
-            *(value * ones for value in _reference(plant, t)),
-            tau,
-        )
+        q_ref, qd_ref, qdd_ref = (value * ones for value in _reference(plant, t))
+        seen = qd + noise * generator.standard_normal(qd.shape)
+        signals = Signals(q, seen, q_ref, qd_ref, qdd_ref, tau)
         if memory is None:
             memory = law.start(gains, signals, period)
         tau, memory = law.step(gains, memory, signals, period)
