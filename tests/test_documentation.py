@@ -175,6 +175,8 @@ def test_formulas_and_charts_are_drawn(browser, site):
     assert browser.run("document.fonts.check('16px mathematics')")
     fraction = "document.querySelector('math[display=block] mfrac').getBoundingClientRect()"
     assert browser.run(f"{fraction}.height") > 25
+    left = "document.querySelector('{}').getBoundingClientRect().left"
+    assert browser.run(f"{left.format('msqrt > *')} - {left.format('msqrt')}") > 5  # the sign of the root is there
     assert "\\(" not in browser.run("document.querySelector('article').innerText")
     charts = "[...document.querySelectorAll('.chart svg')].map((chart) => chart.getBoundingClientRect().width)"
     assert min(browser.run(charts)) > 200

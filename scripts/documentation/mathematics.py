@@ -16,6 +16,8 @@ from latex2mathml.converter import convert
 FONT = Path(ziamath.__file__).parent / "fonts/STIXTwoMath-Regular.ttf"
 LETTERS = {*range(0x20, 0x7F), *range(0x391, 0x3CA), *range(0x1D434, 0x1D468), *range(0x1D6E2, 0x1D71C), 0x210E}
 """Latin and Greek, upright and italic: browsers themselves make the variables of a formula italic."""
+RADICAL = 0x221A
+"""Which browsers draw where MathML has an element and no character."""
 FORMULA = re.compile(
     r'<span class="arithmatex">\\\((?P<inline>.*?)\\\)</span>|<div class="arithmatex">\s*\\\[(?P<block>.*?)\\\]</div>',
     re.DOTALL,
@@ -43,7 +45,7 @@ def font(characters: Iterable[int]) -> bytes:
     options = subset.Options(layout_features=["ssty"], name_IDs=[], hinting=False)
     whole = TTFont(FONT)
     chosen = subset.Subsetter(options)
-    chosen.populate(unicodes=LETTERS | set(characters))
+    chosen.populate(unicodes={*LETTERS, RADICAL, *characters})
     chosen.subset(whole)
     whole.flavor = "woff"
     file = io.BytesIO()

@@ -52,7 +52,8 @@ def cards() -> list[Path]:
 def environment(env_id: str) -> str:
     """The page of an environment: its docstring, then what the registries know of it."""
     spec, robot = gym.spec(env_id), robot_of(env_id)
-    parts = [f"# {env_id}", _page(load_env_creator(str(spec.entry_point))), "## Example", EXAMPLE.format(env_id=env_id)]
+    page = _page(load_env_creator(str(spec.entry_point)))
+    parts = [f"# {env_id}", page, "## Example", EXAMPLE.format(env_id=env_id)]
     scenarios = [
         f"| {entry.name} | {entry.text} | `{json.dumps(dict(entry.kwargs))}` |"
         for entry in SCENARIOS.values()
@@ -62,9 +63,8 @@ def environment(env_id: str) -> str:
         parts += ["## Scenarios", "\n".join(["| scenario | what it is | arguments |", "|---|---|---|", *scenarios])]
     parts += ["## Controllers", "Gains of the robot's presets, a controller's first one its default.", _presets(robot)]
     if spec.vector_entry_point:
-        vector = _page(load_env_creator(str(spec.vector_entry_point)))
-        shared = vector.index("## Action"), vector.index("## Arguments")
-        parts += ["## Many at once", _deeper(vector[: shared[0]] + vector[shared[1] :])]
+        own = [part for part in _sections(_page(load_env_creator(str(spec.vector_entry_point)))) if part not in page]
+        parts += ["## The vector environment", *(part.replace("## ", "### ", 1) for part in own)]
     return "\n\n".join(parts) + "\n"
 
 
@@ -76,8 +76,9 @@ def _page(documented: Any) -> str:
     return re.sub(r"\bdocs/(\w+)\.md\b", r"[\1](../\1.md)", text)
 
 
-def _deeper(text: str) -> str:
-    return re.sub(r"^##", "###", text, flags=re.MULTILINE)
+def _sections(page: str) -> list[str]:
+    """What stands before the first head, and each section with its head."""
+    return [part.strip() for part in re.split(r"^(?=## )", page, flags=re.MULTILINE)]
 
 
 def _presets(robot: str) -> str:
