@@ -2,22 +2,33 @@
 
 from __future__ import annotations
 
+import dataclasses
 import html.parser
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote, urldefrag
 
+import gymnasium as gym
 import nbformat
+import numpy as np
 import pytest
 import typer.main
 from documentation.blocks import Block, blocks, commands, script
+from documentation.figures import FIGURES
 from documentation.notebooks import NOTEBOOKS, notebook
 from documentation.pages import ROOT, generated
+from documentation.plant import ARM, modelled, simulate
 from nbclient import NotebookClient
 
 from artde_gym.cli import app
+from artde_gym.evaluation import SCENARIOS
+from artde_gym.evaluation.environments import ours
+from controllers.law_table import LAWS
+from controllers.laws.computed_torque import ComputedTorqueGains
 
 DOCS = ROOT / "docs"
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -195,3 +206,35 @@ def test_search_finds_a_word_without_a_server(browser, site):
     browser.run(wait)
     assert {name.split(".")[0] for name in browser.run(hits)} >= {"artde", "deviations"}
     assert browser.errors == []
+
+
+@pytest.mark.parametrize("env_id", ours())
+def test_page_of_an_environment_has_its_whole_layout(env_id):
+    page = PAGES[f"environments/{env_id}.md"]
+    env: Any = gym.make(env_id, duration=0.1).unwrapped
+    for field in (*env.observation_layout.fields, *env.action_layout.fields):
+        assert f"`{field.name}`" in page
+    env.close()
+    for scenario in SCENARIOS.values():
+        assert (f"| {scenario.name} |" in page) == (scenario.env_id == env_id)
+    assert not re.search(r"{(default|observation|shared)}", page)
+
+
+def test_every_law_has_a_page_with_its_code_and_a_figure():
+    asked = {name: re.findall(r"<!-- (figure|source): (\S+) -->", text) for name, text in PAGES.items()}
+    laws = {path: text for path, text in asked.items() if path.startswith("laws/") and path != "laws/index.md"}
+    assert all({kind for kind, _ in found} == {"figure", "source"} for found in laws.values())
+    figures = {name for found in laws.values() for kind, name in found if kind == "figure"}
+    sources = {name for found in laws.values() for kind, name in found if kind == "source"}
+    assert figures == set(FIGURES)
+    functions = {entry.law.step.__module__ for entry in LAWS.values() if "law_table" not in entry.law.step.__module__}
+    assert {f"{module.replace('.', '/')}.py" for module in functions} <= sources
+
+
+def test_an_arm_under_its_exact_model_obeys_the_designed_error():
+    """Computed torque leaves no error but that of a torque held for a sampling period: the plant is what it says."""
+    gains = ComputedTorqueGains(25.0, 10.0)
+    arm = dataclasses.replace(ARM, load=0.0, load_weight=0.0, push=0.0)
+    coarse, fine = (np.abs(simulate(modelled(arm), gains, arm, period).e).max() for period in (0.004, 0.001))
+    assert fine < 5e-4
+    assert coarse / fine == pytest.approx(4.0, rel=0.1)

@@ -16,16 +16,16 @@ from artde_gym.evaluation.palette import looks
 from artde_gym.evaluation.report.chart import Axis, Chart
 from artde_gym.evaluation.report.diagram import cascade, joint_loop
 from artde_gym.evaluation.report.html import figure
-from controllers.law_table import LAWS, Nothing
+from controllers.law_table import LAWS
 from controllers.laws.attitude import attitude_error
-from controllers.laws.computed_torque import ComputedTorqueGains, computed_torque
+from controllers.laws.computed_torque import ComputedTorqueGains
 from controllers.laws.positional_pid import PositionalPidGains
 from controllers.laws.rigid_attitude import rigid_attitude
 from controllers.laws.tde import ConstantGains, equivalent_gains
-from controllers.laws.tracking import Law, Signals
+from controllers.laws.tracking import Signals
 from controllers.laws.vectors import components, joined
 from controllers.presets import PRESETS
-from documentation.plant import ARM, DURATION, LIFT, LOADED, PUSHED, Plant, Run, simulate
+from documentation.plant import ARM, DURATION, LIFT, LOADED, PUSHED, Plant, Run, modelled, simulate
 
 ARM_PERIOD, LIFT_PERIOD = 0.004, 0.015  # s
 NOISE = 0.02  # m/s, of a measured velocity
@@ -162,19 +162,8 @@ def indi() -> str:
 
 
 def computed() -> str:
-    """The arm's model is the true one until the load comes."""
-
-    def start(_gains: Any, _signals: Signals, _period: float) -> Any:
-        return Nothing()
-
-    def step(gains: ComputedTorqueGains, memory: Any, signals: Signals, _period: float) -> tuple[Array, Any]:
-        def inverse_dynamics(q: Array, qd: Array, qdd: Array) -> Array:
-            return ARM.inertia * qdd + ARM.damping * qd + ARM.weight * np.sin(q)
-
-        return computed_torque(gains, signals, inverse_dynamics), memory
-
     gains = ComputedTorqueGains(25.0, 10.0)
-    runs = {"computed-torque": simulate(Law(start, step), gains, ARM, ARM_PERIOD), "tde": arm("tde")}
+    runs = {"computed-torque": simulate(modelled(ARM), gains, ARM, ARM_PERIOD), "tde": arm("tde")}
     charts = {"error": over_time("|e| (deg)", {name: size(run) for name, run in runs.items()}, log=True)}
     before = {name: _rms(run, run.time < LOADED) for name, run in runs.items()}
     after = {name: _rms(run, run.time >= LOADED) for name, run in runs.items()}

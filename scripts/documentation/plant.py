@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from artde_gym.arrays import Array
+from controllers.law_table import Nothing
+from controllers.laws.computed_torque import ComputedTorqueGains, computed_torque
 from controllers.laws.tracking import Law, Signals
 from controllers.policies import flatten
 
@@ -95,6 +97,21 @@ def simulate(law: Law, gains: Any, plant: Plant, period: float, *, duration: flo
             q = q + (period / SUBSTEPS) * qd
     names = {name: np.array([sample[name] for sample in inside]) for name in inside[0]}
     return Run(plant, time, np.array(errors), np.array(forces), names)
+
+
+def modelled(plant: Plant) -> Law:
+    """Computed torque with the plant's own equation, but for the load, which it does not know."""
+
+    def start(_gains: Any, _signals: Signals, _period: float) -> Nothing:
+        return Nothing()
+
+    def step(gains: ComputedTorqueGains, memory: Any, signals: Signals, _period: float) -> tuple[Array, Any]:
+        def inverse_dynamics(q: Array, qd: Array, qdd: Array) -> Array:
+            return plant.inertia * qdd + plant.damping * qd + _weight(plant, q, 0.0)
+
+        return computed_torque(gains, signals, inverse_dynamics), memory
+
+    return Law(start, step)
 
 
 def _reference(plant: Plant, time: float) -> tuple[float, float, float]:
