@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 import shlex
 from typing import NamedTuple
 
 FENCE = re.compile(r"^```[ ]*(?P<language>\w*)[^\n]*\n(?P<text>.*?)^```[ ]*$", re.DOTALL | re.MULTILINE)
 NOT_RUN = re.compile(r"<!-- not run: (?P<reason>.+?) -->\s*\Z")
+
+
+SHELL = ["bash", "-euo", "pipefail", "-c"]
 
 
 class Block(NamedTuple):
@@ -38,9 +40,7 @@ def script(parts: list[Block]) -> str:
         if part.language == "python" and not part.reason:
             lines.append(part.text)
         elif part.language == "sh" and not part.reason:
-            lines.append(
-                f"__import__('subprocess').run(['bash', '-euo', 'pipefail', '-c', {part.text!r}], check=True)\n"
-            )
+            lines.append(f"import subprocess\n\nsubprocess.run({[*SHELL, part.text]!r}, check=True)\n")
     return "\n".join(lines)
 
 
@@ -48,7 +48,7 @@ def commands(markdown: str) -> list[list[str]]:
     """The words after `artde-gym` of all its calls, in shell blocks, indented lines and code spans."""
     shell = [part.text for part in blocks(markdown) if part.language == "sh"]
     prose = [part.text for part in blocks(markdown) if part.language == "markdown"]
-    lines = list(itertools.chain.from_iterable(text.replace("\\\n", " ").splitlines() for text in shell))
+    lines = [line for text in shell for line in text.replace("\\\n", " ").splitlines()]
     indented = [line.strip() for text in prose for line in text.replace("\\\n", " ").splitlines() if line[:4] == "    "]
     spans = [span.replace("\n", " ") for text in prose for span in re.findall(r"`([^`]+)`", text)]
     calls = [shlex.split(line, comments=True) for line in (*lines, *indented, *spans) if line.startswith("artde-gym ")]

@@ -11,13 +11,13 @@ from typing import Any
 import gymnasium as gym
 from gymnasium.envs.registration import load_env_creator
 
-import artde_gym  # registers the environments
+import artde_gym  # noqa: F401  # registers the environments
 from artde_gym.evaluation import SCENARIOS
 from artde_gym.evaluation.environments import ours, robot_of
 from artde_gym.registration import registered_controllers
 from controllers.presets import PRESETS
 
-ROOT = Path(artde_gym.__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 RAISES = re.compile(r"^Raises:\n((?:    .*\n?)+)", re.MULTILINE)
 EXAMPLE = """\
 ```python
