@@ -82,10 +82,10 @@ def _sections(page: str) -> list[str]:
 
 
 def _presets(robot: str) -> str:
-    texts = {name: spec.text for name, spec in registered_controllers().items()}
+    texts = {name: spec.text for name, spec in registered_controllers().items()}  # of their default presets
     rows = ["| controller | what it is | preset | source of its gains |", "|---|---|---|---|"]
     rows += [
-        f"| `{law}` | {texts.get(law, '')} | `{preset}` | {entry.source} |"
+        f"| `{law}` | {texts.pop(law, '')} | `{preset}` | {entry.source} |"
         for (law, preset), entry in PRESETS[robot].items()
     ]
     return "\n".join(rows)
