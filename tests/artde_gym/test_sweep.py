@@ -279,9 +279,54 @@ def test_killed_five_times_it_ends_with_the_same_bits(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_ray_cluster_gives_the_same_bits(tmp_path, file, whole):
+def test_ray_gives_the_same_bits(tmp_path, file, whole):
     pytest.importorskip("ray", reason="Ray is not installed (extra scale)")
     arguments = command(file, tmp_path / "run", "--engine", "ray", "--workers", "2")
     outcome = subprocess.run(arguments, capture_output=True, text=True, timeout=300, check=False)
     assert outcome.returncode == 0, outcome.stderr
+    same(read_sweep(tmp_path / "run"), whole)
+
+
+CLUSTER = """
+import sys
+import ray
+
+ray.init("local", num_cpus=2, include_dashboard=False, object_store_memory=80 * 2**20, log_to_driver=False)
+print(ray.get_runtime_context().gcs_address, flush=True)
+sys.stdin.read()
+"""
+
+
+def busy_worker_of(address: str) -> int | None:
+    """A process of the cluster that is at an episode."""
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            if (path / "cmdline").read_bytes().startswith(b"ray::_on_node"):
+                parent = (path / "stat").read_text().rpartition(")")[2].split()[1]
+                if address.encode() in (path.parent / parent / "cmdline").read_bytes():
+                    return int(path.name)
+        except OSError:
+            continue
+    return None
+
+
+@pytest.mark.slow
+def test_a_running_cluster_that_loses_a_worker_gives_the_same_bits(tmp_path, file, whole):
+    pytest.importorskip("ray", reason="Ray is not installed (extra scale)")
+    quiet = {**os.environ, "RAY_USAGE_STATS_ENABLED": "0"}
+    pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen([sys.executable, "-c", CLUSTER], env=quiet, text=True, **pipes) as cluster:
+        assert cluster.stdout
+        address = cluster.stdout.readline().strip()
+        arguments = command(file, tmp_path / "run", "--engine", "ray", "--address", address)
+        with subprocess.Popen(arguments, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+            worker = None
+            while worker is None and process.poll() is None:
+                worker = busy_worker_of(address)
+            if worker is not None:
+                os.kill(worker, signal.SIGKILL)
+            _, errors = process.communicate(timeout=300)
+        cluster.communicate()
+    assert worker is not None, errors
+    assert process.returncode == 0, errors
     same(read_sweep(tmp_path / "run"), whole)
