@@ -7,9 +7,11 @@ import json
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import pandas as pd
 import pytest
+from gymnasium.envs.registration import EnvSpec
 from typer.testing import CliRunner
 
 from artde_gym.cli import app
@@ -73,6 +75,33 @@ def test_crashes_are_those_of_single() -> None:
     assert single["fall_reason"].tolist() == batch["fall_reason"].tolist()
     np.testing.assert_allclose(batch["time_to_fall_s"], single["time_to_fall_s"], atol=0.031)
     np.testing.assert_allclose(batch["rmse_m_x"], single["rmse_m_x"], atol=2e-3)
+
+
+def test_bipeds_in_batches_are_single_ones_to_the_bit(tmp_path: Path) -> None:
+    """Metrics and signals of walks that fall and of walks that do not; in the same engine nothing may differ."""
+    ahead = {"magnitude": {"uniform": [1.0, 250.0]}, "start": 0.1, "duration": 0.1}
+    mild: dict[str, Any] = {"payload": {"mass": {"uniform": [0.5, 1.5]}}, "push": [ahead], "mass_error": 1.02}
+    for backend in ("single", "batch"):
+        evaluate(
+            ["tde", "artde"],
+            "BipedPush-v0",
+            episodes=5,
+            disturbances=mild,
+            env_kwargs={"engine": "mujoco", "duration": 1.2, "control_period": 0.002},
+            out=tmp_path / backend,
+            traced=2,
+            backend=backend,  # pyright: ignore[reportArgumentType]
+        )
+    single, batch = tmp_path / "single", tmp_path / "batch"
+    assert (single / "episodes.csv").read_bytes() == (batch / "episodes.csv").read_bytes()
+    fell = pd.read_csv(single / "episodes.csv")["fell"].tolist()
+    assert 0 < sum(fell) < len(fell)
+    assert len(list(single.glob("traces/*/*.npz"))) == 4
+    for path in single.glob("traces/*/*.npz"):
+        one, other = np.load(path), np.load(batch / path.relative_to(single))
+        assert set(one) == set(other)
+        for name in one:
+            assert np.array_equal(one[name], other[name]), name
 
 
 @pytest.mark.parametrize(
@@ -160,7 +189,8 @@ def test_chunks_cover_all_evenly() -> None:
 @pytest.mark.parametrize(
     ("arguments", "error", "words"),
     [
-        ({"env_id": "BipedPush-v0"}, OptionError, ["batch backend", "BipedPush-v0", QUADROTOR]),
+        ({"env_id": "BipedPush-v0", "env_kwargs": {"engine": "bullet"}}, OptionError, ["engine", "bullet", "'mujoco'"]),
+        ({"env_id": "BipedPush-v0", "env_kwargs": {"threads": 0}}, OptionError, ["threads", "0", ">= 1"]),
         ({"backend": "bach"}, OptionError, ["backend", "bach", "did you mean 'batch'"]),
         ({"traced": -1}, OptionError, ["traced", "-1"]),
         ({"env_kwargs": {"engine": "bullet"}}, OptionError, ["engine", "dtype"]),
@@ -178,6 +208,13 @@ def test_bad_arguments_are_refused_before_the_first_episode(
     for word in words:
         assert word in str(caught.value)
     assert not (tmp_path / "run").exists()
+
+
+def test_an_environment_without_a_vector_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    alone = EnvSpec("Alone-v0", entry_point="artde_gym.envs.biped_walk:BipedWalkPayloadEnv")
+    monkeypatch.setitem(gym.registry, "Alone-v0", alone)
+    with pytest.raises(OptionError, match=rf"batch backend.*Alone-v0.*BipedPush-v0.*{QUADROTOR}"):
+        evaluate(["tde"], "Alone-v0", episodes=1, backend="batch")
 
 
 @pytest.mark.parametrize(("backend", "scenarios"), [("single", ["Q1", "Q1-calm", "Q1-gale"]), ("batch", ["Q1"])])
