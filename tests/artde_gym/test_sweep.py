@@ -16,8 +16,10 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
+import artde_gym
+from artde_gym import registration
 from artde_gym.cli import app
-from artde_gym.errors import ArtdeGymError, DisturbanceError, OptionError, StoreError, WorkerError
+from artde_gym.errors import ActionError, ArtdeGymError, DisturbanceError, OptionError, StoreError, WorkerError
 from artde_gym.evaluation import evaluate, read_sweep, sweep
 from artde_gym.evaluation.workers import run_parallel
 from controllers import GainError
@@ -157,6 +159,24 @@ def test_without_its_packages_the_extra_is_named(tmp_path, monkeypatch, name):
     monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(OptionError, match=r"artde-gym\[sweep\]"):
         sweep(tmp_path / "sweep.yaml", tmp_path / "run")
+
+
+def test_an_error_in_one_of_many_cells_names_the_cell(tmp_path, monkeypatch):
+    (tmp_path / "broken.py").write_text(
+        "import numpy as np\n"
+        "class Broken:\n"
+        "    def __init__(self, env, value=0.0):\n"
+        "        self.action = np.full(4, value / value - 1.0 if value else np.nan)\n"
+        "    def predict(self, observation, state=None, episode_start=None, deterministic=True):\n"
+        "        return self.action, None\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(registration, "_controllers", registration.registered_controllers())
+    artde_gym.register_controller("broken", "broken:Broken")
+    given = {"env": "QuadInfinity-Payload-v0", "controller": "broken", "env_kwargs": QUICK}
+    with pytest.raises(ActionError, match=r"broken with \{'value': 0\.0\}.*duration"):
+        sweep({**given, "grid": {"gains.broken.value": [1.0, 0.0]}}, tmp_path / "run")
+    assert read_sweep(tmp_path / "run")["gains.value"].tolist() == [1.0]  # what was finished before is kept
 
 
 # ---------------------------------------------------------------- workers that die
