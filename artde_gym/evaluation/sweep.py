@@ -14,7 +14,7 @@ from typing import Any, Literal, get_args
 
 import pandas as pd
 
-from artde_gym.errors import OptionError, StoreError, among
+from artde_gym.errors import ArtdeGymError, OptionError, StoreError, among
 from artde_gym.evaluation import sweep_part
 from artde_gym.evaluation.evaluate import (
     CHUNK,
@@ -137,8 +137,17 @@ def _runs(
     on_wait: Callable[[], None],
 ) -> Runs:
     if executor == "ray":
-        return run_on_ray(run_task, tasks, workers, address, on_wait)
-    return run_here(run_task, tasks, on_time) if workers == 1 else run_parallel(run_task, tasks, workers, on_time)
+        return run_on_ray(_run, tasks, workers, address, on_wait)
+    return run_here(_run, tasks, on_time) if workers == 1 else run_parallel(_run, tasks, workers, on_time)
+
+
+def _run(task: Task, on_time: Callable[[float], None]) -> list[Episode]:
+    """Run a task; what goes wrong in one of many cells is told with the cell."""
+    try:
+        return run_task(task, on_time)
+    except ArtdeGymError as error:
+        cell = f"{task.controller} with {task.gains}, {task.cell.env_id} with {task.cell.kwargs}, seeds {task.seeds}"
+        raise type(error)(f"{error.field} ({cell})", error.value, error.allowed) from error
 
 
 def _refuse_others(plan: Design, store: SweepStore) -> None:
