@@ -59,6 +59,7 @@ class OjasMemory(NamedTuple):
         right: whether the right leg carries (...).
         single: whether one leg alone is planned to (...).
         gate: (...).
+        drift: squared horizontal velocity error (...) (m^2/s^2).
         ankles: of the reference, standing and swinging leg, in the mirror (..., 2, 3) (m).
         offsets: of feet on the ground or in the air: standing x, y, swinging x, y, in the mirror (..., 4) (m).
         action: in the mirror (..., n).
@@ -69,6 +70,7 @@ class OjasMemory(NamedTuple):
     right: NDArray[np.bool_]
     single: NDArray[np.bool_]
     gate: Array
+    drift: Array
     ankles: Array
     offsets: Array
     action: Array
@@ -132,6 +134,7 @@ class OjasCoupling:
             no,
             no,
             np.zeros(lead, kind),
+            np.zeros(lead, kind),
             np.zeros((*lead, 2, 3), kind),
             np.zeros((*lead, 4), kind),
             np.zeros((*lead, len(self.actions)), kind),
@@ -153,7 +156,9 @@ class OjasCoupling:
         velocity_ref = (ankles[..., 4, :] - ankles[..., 3, :]) / (2 * DIFFERENCE)
         velocity_error = seen[..., at["base_velocity"]] - velocity_ref
         displacement = ankles[..., 0, :] - level(tilt, ankles[..., 2, :])
-        gate = self._gate(tilt, velocity_error, memory.gate)
+        sideways = velocity_error[..., :2]
+        drift = np.vecdot(sideways, sideways)
+        gate = self._gate(tilt, drift, memory.gate)
         load = seen[..., at["load_left_ref"]]
         changed = right != memory.right
         offsets, action = memory.offsets, memory.action
@@ -184,7 +189,12 @@ class OjasCoupling:
             action,
         ]
         kept = memory._replace(
-            right=right, single=load[..., 0] > _SINGLE, gate=gate, ankles=ankles[..., :2, :], offsets=offsets
+            right=right,
+            single=load[..., 0] > _SINGLE,
+            gate=gate,
+            drift=drift,
+            ankles=ankles[..., :2, :],
+            offsets=offsets,
         )
         return np.concatenate(parts, axis=-1, dtype=observation.dtype), kept
 
@@ -220,24 +230,22 @@ class OjasCoupling:
 
     def reward_terms(self, observation: Array, memory: OjasMemory, fell: Any) -> dict[str, Array]:
         at, action = self._at, memory.action
-        tilt, velocity = observation[..., at["tilt"]], observation[..., at["base_velocity"]]
+        tilt = observation[..., at["tilt"]]
         e = observation[..., at["q_ref"]] - observation[..., at["q"]]
-        too_fast = velocity[..., :2] - np.array([0.1, 0.0])
         return {
             "alive": np.ones(observation.shape[:-1]),
             "upright": np.exp(-np.vecdot(tilt, tilt) / 0.02),
-            "velocity": np.exp(-np.vecdot(too_fast, too_fast) / 0.1),
+            "velocity": np.exp(-memory.drift / 0.1),
             "tracking": np.exp(-np.vecdot(e, e) / 0.02),
-            "residual": np.vecdot(action, action),
+            "residual": memory.gate * np.vecdot(action, action),
             "fall": np.asarray(fell, dtype=np.float64),
         }
 
-    def _gate(self, tilt: Array, velocity_error: Array, before: Array) -> Array:
+    def _gate(self, tilt: Array, drift: Array, before: Array) -> Array:
         if not self._gated:
             return np.ones_like(before)
-        sideways = velocity_error[..., :2]
         by_tilt = _smooth(np.sqrt(np.vecdot(tilt, tilt)), *OPENS_TILT)
-        by_speed = _smooth(np.sqrt(np.vecdot(sideways, sideways)), *OPENS_SPEED)
+        by_speed = _smooth(np.sqrt(drift), *OPENS_SPEED)
         kept = before * np.exp(-self._hold / CLOSING)
         kept = np.where(kept > _CLOSED, kept, 0.0)
         return np.maximum(np.maximum(by_tilt, by_speed), kept).astype(before.dtype, copy=False)

@@ -23,7 +23,7 @@ from baselines.recipe import Recipe
 from baselines.residual import Residual
 from baselines.residual_env import ResidualEnv
 from baselines.run import Progress, Run, Training, environment_kwargs, single
-from baselines.vec_env import ResidualVecEnv
+from baselines.vec_env import batched
 
 HIDDEN = (64, 64)
 CRITIC = (256, 256)  # of SAC
@@ -133,11 +133,8 @@ class _Watcher(BaseCallback):
 def _environments(training: Training, run: Run) -> tuple[VecEnv, Residual]:
     """Environments of a training, and the residual that they share."""
     kwargs, task = environment_kwargs(training), run.task
-    if task.batched:
-        kwargs.pop("engine", None)  # it is one
-        count = training.envs or task.envs or 1
-        batch = gym.make_vec(training.env_id, count, vectorization_mode="vector_entry_point", dtype="float32", **kwargs)
-        env = ResidualVecEnv(batch, training.recipe)
+    if run.batched:
+        env = batched(training.env_id, training.recipe, training.envs or task.envs, kwargs)
         return env, env.residual
     count = training.envs or training.workers
     makers: list[Callable[[], gym.Env[Any, Any]]] = [

@@ -26,7 +26,7 @@ from baselines.recipe import Recipe
 from baselines.residual_env import ResidualEnv
 from baselines.run import Run, Training
 from baselines.train import _environments, _Trainer, train
-from baselines.vec_env import ResidualVecEnv
+from baselines.vec_env import ResidualVecEnv, batched
 
 QUADROTOR = "QuadInfinity-Payload-v0"
 GALE = {"wind": 2.0, "ground_effect": 1.0}
@@ -190,10 +190,46 @@ def test_the_adapter_is_what_the_single_environment_is():
     single.close()
 
 
+def bipeds(count: int, **kwargs: Any) -> ResidualVecEnv:
+    pushes = [{"body": "chest", "magnitude": 60.0, "direction": ANYWHERE, "start": {"uniform": [0.05, 0.4]}}]
+    more = {"duration": 1.2, "self_collision": True, "disturbances": {"push": pushes, "payload": 0.5}, **kwargs}
+    return batched("BipedPush-v0", Recipe("ojas"), count, more)
+
+
+ANYWHERE = [{"normal": [0.0, 1.0]}, {"normal": [0.0, 1.0]}, 0.0]
+
+
+def test_the_adapter_is_the_single_biped_to_the_bit():
+    """Falls within a decision, and what begins after them, included."""
+    pytest.importorskip("mujoco")
+    vector = bipeds(3)
+    single = ResidualEnv(
+        gym.make("BipedPush-v0", disable_env_checker=True, engine="mujoco", **vector.env.spec.kwargs), Recipe("ojas")
+    )
+    vector.seed(7)
+    many: Any = vector.reset()
+    one, _ = single.reset(seed=9)
+    rng = np.random.default_rng(0)
+    falls = ends = 0
+    for _ in range(150):
+        np.testing.assert_array_equal(many[2], one)
+        actions = rng.uniform(-1, 1, (3, 11)).astype("f4")
+        many, rewards, done, infos = vector.step(actions)
+        one, reward, terminated, truncated, _ = single.step(actions[2])
+        assert (rewards[2], done[2]) == (np.float32(reward), terminated or truncated)
+        if done[2]:
+            ends, falls = ends + 1, falls + terminated
+            np.testing.assert_array_equal(infos[2]["terminal_observation"], one)
+            one, _ = single.reset()
+    assert ends > falls > 0
+    vector.close()
+    single.close()
+
+
 def test_the_adapter_says_what_it_cannot_do():
     env = ResidualVecEnv(batch(2, duration=1.0), Recipe("q450"))
     assert VecMonitor(env).num_envs == 2
-    with pytest.raises(OptionError, match="none: the vehicles share one environment"):
+    with pytest.raises(OptionError, match="none: they share one environment"):
         env.set_attr("x", 1)
     with pytest.raises(OptionError, match=r"hold is 0\.03"):
         ResidualVecEnv(batch(2, duration=1.0), Recipe("q450", hold=0.03))
