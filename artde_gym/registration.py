@@ -80,7 +80,7 @@ def make_controller(name: str, env: Any, **overrides: Any) -> Any:
         UnknownNameError: if no controller has this name.
     """
     known = _known(name)
-    return _resolved(known.entry_point)(env, **{**known.kwargs, **overrides})
+    return resolved(known.entry_point)(env, **{**known.kwargs, **overrides})
 
 
 def search_space(name: str, env: Any) -> dict[str, GainRange]:
@@ -93,7 +93,7 @@ def search_space(name: str, env: Any) -> dict[str, GainRange]:
     if known.search is None:
         tunable = [other for other, spec in _controllers.items() if spec.search is not None]
         raise UnknownNameError("controller to be tuned", name, among(name, tunable))
-    return dict(_resolved(known.search)(env, **known.kwargs))
+    return dict(resolved(known.search)(env, **known.kwargs))
 
 
 def _known(name: str) -> ControllerSpec:
@@ -102,7 +102,8 @@ def _known(name: str) -> ControllerSpec:
     return _controllers[name]
 
 
-def _resolved(entry_point: str) -> Callable[..., Any]:
+def resolved(entry_point: str) -> Callable[..., Any]:
+    """The function that an entry point "module:function" names."""
     module, function = entry_point.split(":")
     return getattr(importlib.import_module(module), function)
 
