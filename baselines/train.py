@@ -42,15 +42,17 @@ def train(training: Training, out: str | Path, on_progress: Callable[[Progress],
         TrainingError: if `out` holds a run of another configuration.
     """
     run = Run(training, Path(out), on_progress)
-    env, residual = _environments(training, run)
+    env, residual = environments(training, run)
     try:
-        _Trainer(run, env, residual).go()
+        Trainer(run, env, residual).go()
     finally:
         env.close()
     return run.exported
 
 
-class _Trainer:
+class Trainer:
+    """A run's environments, model and checkpoints; `learn` is one interval, `go` all that are left."""
+
     def __init__(self, run: Run, env: VecEnv, residual: Residual) -> None:
         self.run, self.residual = run, residual
         training, task = run.training, run.task
@@ -71,14 +73,14 @@ class _Trainer:
         run, training = self.run, self.run.training
         self._report(self.steps)
         while self.steps < training.steps and run.state["stale"] < training.patience:
-            self._learn()
+            self.learn()
             if self.number % training.test_every == 0 or self.steps >= training.steps:
                 found = run.test(exported(self.model, self.env), self.residual, self.steps, {"level": self.level})
                 self._log({f"test/{name}": value for name, value in found.items()})
             state = {"interval": self.number, "steps": self.steps, "level": self.level, **run.state}
             self.checkpoints.save(self.model, self.env, state)
 
-    def _learn(self) -> None:
+    def learn(self) -> None:
         """One interval, from fresh episodes."""
         run, model = self.run, self.model
         words = np.random.SeedSequence([run.training.seed, self.number]).generate_state(2)
@@ -130,7 +132,7 @@ class _Watcher(BaseCallback):
         return 1.0 - self._fell / self._ended if self._ended >= ENDED else None
 
 
-def _environments(training: Training, run: Run) -> tuple[VecEnv, Residual]:
+def environments(training: Training, run: Run) -> tuple[VecEnv, Residual]:
     """Environments of a training, and the residual that they share."""
     kwargs, task = environment_kwargs(training), run.task
     if run.batched:

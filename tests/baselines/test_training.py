@@ -25,7 +25,7 @@ from baselines.export import exported
 from baselines.recipe import Recipe
 from baselines.residual_env import ResidualEnv
 from baselines.run import Run, Training
-from baselines.train import _environments, _Trainer, train
+from baselines.train import Trainer, environments, train
 from baselines.vec_env import ResidualVecEnv, batched
 
 QUADROTOR = "QuadInfinity-Payload-v0"
@@ -124,8 +124,8 @@ def test_numpy_inference_equals_torch(tmp_path, quick):
     rng = np.random.default_rng(0)
     for algo in ("ppo", "sac"):
         run = Run(small(algo), tmp_path / algo)
-        env, residual = _environments(run.training, run)
-        trainer = _Trainer(run, env, residual)
+        env, residual = environments(run.training, run)
+        trainer = Trainer(run, env, residual)
         with torch.no_grad():
             for parameter in trainer.model.policy.parameters():
                 parameter += 0.05 * torch.randn_like(parameter)
@@ -258,10 +258,10 @@ def test_something_is_learnt(tmp_path):
         QUADROTOR, recipe, steps=40_960, envs=128, env_kwargs={"duration": 4.0}, options=options, test_every=1000
     )
     run = Run(training, tmp_path)
-    env, residual = _environments(training, run)
-    trainer = _Trainer(run, env, residual)
+    env, residual = environments(training, run)
+    trainer = Trainer(run, env, residual)
     trainer.interval = training.steps
-    trainer._learn()
+    trainer.learn()
     env.close()
     trained = returns(exported(trainer.model, trainer.env), recipe)
     nothing = returns(lambda features: np.zeros((len(features), len(residual.actions))), recipe)

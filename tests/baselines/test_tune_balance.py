@@ -1,4 +1,4 @@
-"""The linear balance law and its tuning: what the law is, that candidates are judged as alone, and that it continues."""
+"""The linear balance law and its tuning: what the law is, candidates judged as if alone, and a tuning continued."""
 
 import json
 from typing import Any
@@ -84,18 +84,15 @@ def test_candidates_are_judged_as_if_each_were_alone(tuning):
     alone = ResidualEnv(gym.make("BipedPush-v0", disable_env_checker=True, engine="mujoco", **kwargs), Recipe("ojas"))
     steps, falls = 0, 0
     for network, cost in zip(networks, costs, strict=True):
-        expected = 0.0
+        total = 0.0
         for seed in seeds:
             features, _ = alone.reset(seed=seed)
-            over, terminated, taken, effort = False, False, 0, 0.0
+            over = terminated = False
             while not over:
-                action = network(features)
-                features, _, terminated, truncated, _ = alone.step(action)
-                over, taken, effort = terminated or truncated, taken + 1, effort + float(action @ action)
+                features, reward, terminated, truncated, _ = alone.step(network(features))
+                over, total, steps = terminated or truncated, total + reward, steps + 1
             falls += terminated
-            expected += terminated * (1.0 - 0.3 * taken * 0.02 / tuning.DURATION) + 0.002 * effort / taken
-            steps += taken
-        assert cost == pytest.approx(expected / 2, abs=1e-6)
+        assert cost == pytest.approx(1.0 - total / 2 / (2.5 * tuning.DURATION / 0.02), abs=1e-6)
     assert count == steps
     assert 0 < falls < 4
     env.close()
