@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.floating[Any]]
+
+
+def each(function: Callable[..., float]) -> Callable[..., Array]:
+    """A function of numbers as one of arrays (n,): what `math` says of each, where NumPy's own would round otherwise."""
+
+    def mapped(*arrays: Array) -> Array:
+        return np.fromiter(map(function, *(array.tolist() for array in arrays)), np.float64, len(arrays[0]))
+
+    return mapped

@@ -110,8 +110,16 @@ def resolved(entry_point: str) -> Callable[..., Any]:
 
 def register_all() -> None:
     """Register what this project brings; called once, by `import artde_gym`."""
-    gym.register(id="BipedWalk-Payload-v0", entry_point="artde_gym.envs.biped_walk:BipedWalkPayloadEnv")
-    gym.register(id="BipedPush-v0", entry_point="artde_gym.envs.biped_push:BipedPushEnv")
+    gym.register(
+        id="BipedWalk-Payload-v0",
+        entry_point="artde_gym.envs.biped_walk:BipedWalkPayloadEnv",
+        vector_entry_point="artde_gym.envs.biped_walk:BipedWalkPayloadVectorEnv",
+    )
+    gym.register(
+        id="BipedPush-v0",
+        entry_point="artde_gym.envs.biped_push:BipedPushEnv",
+        vector_entry_point="artde_gym.envs.biped_push:BipedPushVectorEnv",
+    )
     gym.register(
         id="QuadInfinity-Payload-v0",
         entry_point="artde_gym.envs.quadrotor:QuadInfinityPayloadEnv",

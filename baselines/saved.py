@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, get_args
 
-from artde_gym.envs import biped, quadrotor_task
+from artde_gym.envs import biped_task, quadrotor_task
 from artde_gym.errors import UnknownNameError, among
 from artde_gym.robots.ojas import ActuatorInertia, ojas
 from artde_gym.robots.q450 import q450
@@ -60,7 +60,7 @@ class _Trained:
     """What a policy has to know of the environment of its training, without building it."""
 
     def __init__(self, saved: Saved) -> None:
-        task = {"ojas": biped, "q450": quadrotor_task}[saved.recipe.robot]
+        task = {"ojas": biped_task, "q450": quadrotor_task}[saved.recipe.robot]
         self.robot_name = saved.recipe.robot
         self.observation_layout, self.action_layout = task.OBSERVATION, task.ACTION
         self.control_period = saved.control_period

@@ -8,7 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from artde_gym.robots.spec import Vector
-from artde_gym.sim.engine import Engine
+from artde_gym.sim.engine import World
+
+NEVER = 2**62  # steps
 
 
 class Push(NamedTuple):
@@ -43,34 +45,37 @@ class Schedule:
                 self._add(round(self._payload["attach"] / time_step), "payload attached")
             self._add(round(self._payload["drop"] / time_step), "payload dropped")
 
-    def start(self, engine: Engine) -> None:
+    def start(self, world: World) -> None:
         """Bring about what is there before the first step."""
         if self._payload.get("attach") == 0 and self._payload["drop"] > 0:
-            self._attach(engine)
+            self._attach(world)
 
     def quiet(self, first: int, end: int) -> bool:
         """Whether nothing acts, begins or ends from step `first` up to, not including, `end`."""
-        if not self._changes:  # every push begins and ends
-            return True
-        acting = any(push.first < end and first <= push.end for push in self._pushes)
-        return not acting and not any(first <= step < end for step in self._changes)
+        return not self._changes or self.next(first) >= end
 
-    def apply(self, step: int, engine: Engine) -> list[str]:
+    def next(self, step: int) -> int:
+        """The first step from `step` on in which something acts, begins or ends; `NEVER` if there is none."""
+        if any(push.first <= step < push.end for push in self._pushes):
+            return step
+        return min((change for change in self._changes if change >= step), default=NEVER)  # every push begins and ends
+
+    def apply(self, step: int, world: World) -> list[str]:
         """Bring about what belongs to a step; returns what begins or ends with it, in words."""
         events = self._changes.get(step, [])
         for event in events:
             if event == "payload attached":
-                self._attach(engine)
+                self._attach(world)
             elif event == "payload dropped":
-                engine.release_payload()
+                world.release_payload()
         for push in self._pushes:
             if push.first <= step < push.end:
-                engine.push(push.site, push.force)
+                world.push(push.site, push.force)
         return events
 
-    def _attach(self, engine: Engine) -> None:
+    def _attach(self, world: World) -> None:
         x, y, z = self._payload["position"]
-        engine.attach_payload(self._payload["mass"], (x, y, z))
+        world.attach_payload(self._payload["mass"], (x, y, z))
 
     def _add(self, step: int, event: str) -> None:
         self._changes.setdefault(step, []).append(event)

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from artde_gym.disturbances.pushes import ARM_PUSH, CHEST_PUSH
+from artde_gym.envs import biped_batch
 from artde_gym.envs.biped import BipedEnv, document
 
+DISTURBANCES: dict[str, Any] = {"payload": 1.3, "push": [CHEST_PUSH, ARM_PUSH]}
+_DEFAULT = "payload of 1.3 kg and the two pushes"
 
-@document("payload of 1.3 kg and the two pushes")
+
+@document(_DEFAULT)
 class BipedPushEnv(BipedEnv):
     """Ojas walks with a payload and is pushed twice: on the chest at 28 s, on the left arm at 37 s.
 
@@ -23,4 +29,17 @@ class BipedPushEnv(BipedEnv):
     * v0: first version.
     """
 
-    default_disturbances = {"payload": 1.3, "push": [CHEST_PUSH, ARM_PUSH]}
+    default_disturbances = DISTURBANCES
+
+
+@biped_batch.document(_DEFAULT)
+class BipedPushVectorEnv(biped_batch.BipedVectorEnv):
+    """Many robots walk with a payload and are pushed twice, as the one of `BipedPushEnv`.
+
+    {shared}
+
+    ## Versions
+    * v0: first version.
+    """
+
+    default_disturbances = DISTURBANCES

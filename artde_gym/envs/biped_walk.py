@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+from artde_gym.envs import biped_batch
 from artde_gym.envs.biped import BipedEnv, document
 
+DISTURBANCES: dict[str, Any] = {"payload": 1.3}
+_DEFAULT = "payload of 1.3 kg"
 
-@document("payload of 1.3 kg")
+
+@document(_DEFAULT)
 class BipedWalkPayloadEnv(BipedEnv):
     """Ojas, a 20-joint humanoid of 8.986 kg and 0.94 m, walks with a payload on its torso.
 
@@ -20,4 +26,17 @@ class BipedWalkPayloadEnv(BipedEnv):
     * v0: first version.
     """
 
-    default_disturbances = {"payload": 1.3}
+    default_disturbances = DISTURBANCES
+
+
+@biped_batch.document(_DEFAULT)
+class BipedWalkPayloadVectorEnv(biped_batch.BipedVectorEnv):
+    """Many robots walk with a payload, as the one of `BipedWalkPayloadEnv`.
+
+    {shared}
+
+    ## Versions
+    * v0: first version.
+    """
+
+    default_disturbances = DISTURBANCES

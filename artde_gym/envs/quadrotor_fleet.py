@@ -17,7 +17,7 @@ from artde_gym.arrays import Array
 from artde_gym.disturbances.ground_effect import thrust_gain
 from artde_gym.disturbances.kinds import KINDS
 from artde_gym.disturbances.noise import uniform_noise
-from artde_gym.disturbances.schedule import Push
+from artde_gym.disturbances.schedule import NEVER, Push
 from artde_gym.disturbances.wind import GRID, Air, advance, air, processes, velocity
 from artde_gym.envs import quadrotor_task as task
 from artde_gym.robots import q450 as robot
@@ -27,7 +27,6 @@ from artde_gym.sim.rigid_bodies import MassProperties, RigidBodies, composite, c
 
 FINE = 0.001  # s, resolution of pushes
 PARTS = round(GRID / FINE)
-NEVER = 2**62  # steps
 SLOTS = int(KINDS["torque_delay"].parameters[0].high) + 1  # commands that a delay has to remember
 
 _SITES = {name: place for name, _, place in robot.q450().sites}

@@ -41,7 +41,50 @@ PAYLOAD_RADIUS = 0.08  # m, of the homogeneous ball that is the payload; it show
 PAYLOAD_COLOUR = (0.85, 0.45, 0.1, 1.0)
 
 
-class Engine(Protocol):
+class World(Protocol):
+    """What happens to one robot from outside; gravity, friction and masses stay as they were set."""
+
+    def push(self, site: str, force: Vector) -> None:
+        """Add a force (N, world axes) at a named site of the spec, where it is now, for the next step only.
+
+        Raises:
+            RobotError: for a site that the spec does not have.
+        """
+        ...
+
+    def foot_loads(self) -> tuple[float, ...]:
+        """Normal force of the ground on each foot during the last step (N): z of `ground_forces`, and cheaper."""
+        ...
+
+    def set_friction(self, coefficient: float) -> None:
+        """Set the coefficient of Coulomb friction of the pair foot and ground, from the next step on.
+
+        Of the *pair*: whatever rule the engine has to combine coefficients of two bodies.
+        """
+        ...
+
+    def set_gravity(self, gravity: Vector) -> None:
+        """Set the acceleration of free fall (m/s^2, world axes)."""
+        ...
+
+    def scale_masses(self, factor: float) -> None:
+        """Set mass and inertia of every link, and armature, to so many times the spec's; a payload keeps its own."""
+        ...
+
+    def attach_payload(self, mass: float, position: Vector) -> None:
+        """Fix a ball of `mass` (kg) and `PAYLOAD_RADIUS` to the base link, its centre at `position` in its frame (m).
+
+        It takes over the base's motion, touches nothing, and falls freely, also through the ground, once released. A
+        former payload is gone.
+        """
+        ...
+
+    def release_payload(self) -> None:
+        """Let go of the payload, if there is one."""
+        ...
+
+
+class Engine(World, Protocol):
     """One robot on flat, level ground, which only the spec's collision shapes touch.
 
     Its parts pass through each other, unless the spec says that its feet do not.
@@ -89,47 +132,8 @@ class Engine(Protocol):
         """
         ...
 
-    def push(self, site: str, force: Vector) -> None:
-        """Add a force (N, world axes) at a named site of the spec, where it is now, for the next step only.
-
-        Raises:
-            RobotError: for a site that the spec does not have.
-        """
-        ...
-
-    def foot_loads(self) -> tuple[float, ...]:
-        """Normal force of the ground on each foot during the last step (N): z of `ground_forces`, and cheaper."""
-        ...
-
     def ground_forces(self) -> Array:
         """Whole force of the ground on each foot during the last step, (feet, 3) (N, world axes)."""
-        ...
-
-    def set_friction(self, coefficient: float) -> None:
-        """Set the coefficient of Coulomb friction of the pair foot and ground, from the next step on.
-
-        Of the *pair*: whatever rule the engine has to combine coefficients of two bodies.
-        """
-        ...
-
-    def set_gravity(self, gravity: Vector) -> None:
-        """Set the acceleration of free fall (m/s^2, world axes)."""
-        ...
-
-    def scale_masses(self, factor: float) -> None:
-        """Set mass and inertia of every link, and armature, to so many times the spec's; a payload keeps its own."""
-        ...
-
-    def attach_payload(self, mass: float, position: Vector) -> None:
-        """Fix a ball of `mass` (kg) and `PAYLOAD_RADIUS` to the base link, its centre at `position` in its frame (m).
-
-        It takes over the base's motion, touches nothing, and falls freely, also through the ground, once released. A
-        former payload is gone.
-        """
-        ...
-
-    def release_payload(self) -> None:
-        """Let go of the payload, if there is one."""
         ...
 
     def render(self, camera: Camera) -> NDArray[np.uint8]:

@@ -164,7 +164,7 @@ def payload_velocity(engine: Any) -> np.ndarray:
         mj.mj_kinematics(engine._model, engine._data)
         mj.mj_comPos(engine._model, engine._data)
         jacobian = np.zeros((3, engine._model.nv))
-        mj.mj_jacBodyCom(engine._model, engine._data, jacobian, None, engine._payload)
+        mj.mj_jacBodyCom(engine._model, engine._data, jacobian, None, engine._blueprint.payload)
         return jacobian @ engine._data.qvel
     return np.array(bullet.getBaseVelocity(engine._payload, physicsClientId=engine._client)[0])
 

@@ -13,7 +13,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 import artde_gym
 import controllers
 from artde_gym import registration
-from artde_gym.envs.biped import OBSERVATION
+from artde_gym.envs.biped_task import OBSERVATION
 from artde_gym.errors import OptionError, UnknownNameError
 from controllers.laws.errors import GainError
 

@@ -1,0 +1,292 @@
+"""What the single and the batched biped share: layouts, reward, end of an episode, the walk, documentation."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+
+from artde_gym.arrays import Array
+from artde_gym.disturbances import Disturbances
+from artde_gym.envs.options import steps_per_period
+from artde_gym.layout import Field, Layout
+from artde_gym.references.walking import WalkingPattern, hip_height_above_ankle, walking_pattern
+from artde_gym.robots import ojas as robot
+from artde_gym.robots.dynamics import GRAVITY
+from artde_gym.robots.ojas import ActuatorInertia, ojas
+from artde_gym.robots.spec import RobotSpec, Vector
+from artde_gym.robots.support import Supported
+from artde_gym.sim.engine import World
+from artde_gym.tracking import Effort, Tracked, Tracking
+
+Arms = Literal["fixed", "revolute"]
+
+TIME_STEP = 0.001  # s, of the physics
+FRICTION = 0.8  # of feet and ground
+FALL_TILT_DEG = 35.0
+FALL_HEIGHT = 0.25  # m, of the base; the hips walk at 0.395 m or higher
+SETTLE_STEPS = 300  # of the physics, before the first step, for feet and payload to come to rest
+SETTLE_POSE_STEPS = 1000  # likewise on a slope or in another pose, where the robot rocks first
+SETTLE_STIFFNESS = 420.0  # Nm/rad: what TDE at 1 ms has, Kd m_bar / L
+SETTLE_DAMPING = 10.0  # Nm s/rad
+BARE_DAMPING = 0.5  # Nm s/rad, likewise without rotors: held for a step, more than 2 M / TIME_STEP of a foot diverges
+MAX_SPEED = 200.0  # rad/s, bound of observed joint speeds
+
+N_JOINTS = 12
+
+OBSERVATION = Layout(
+    (
+        Field("q", N_JOINTS, "rad", -2 * math.pi, 2 * math.pi, "leg joint angles, left q1..q6 then right q1..q6"),
+        Field("qd", N_JOINTS, "rad/s", -MAX_SPEED, MAX_SPEED, "leg joint velocities"),
+        Field("q_ref", N_JOINTS, "rad", -math.pi, math.pi, "reference angles"),
+        Field("qd_ref", N_JOINTS, "rad/s", -50.0, 50.0, "reference velocities"),
+        Field("qdd_ref", N_JOINTS, "rad/s^2", -1000.0, 1000.0, "reference accelerations"),
+        Field(
+            "tau_applied",
+            N_JOINTS,
+            "Nm",
+            -robot.TORQUE_LIMIT,
+            robot.TORQUE_LIMIT,
+            "torques really applied over the last control period",
+        ),
+        Field("base_height", 1, "m", -1.0, 2.0, "base origin (middle of the hip line) above the ground"),
+        Field("tilt", 2, "rad", -math.pi, math.pi, "roll about x and pitch about y of the base"),
+        Field("base_velocity", 3, "m/s", -100.0, 100.0, "of the base origin, world axes"),
+        Field("base_angular_velocity", 3, "rad/s", -MAX_SPEED, MAX_SPEED, "of the base, world axes"),
+        Field("contact", 2, "1", 0.0, 1.0, "1 where the left, right foot carries more than 1 N"),
+        Field("load_left_ref", 1, "1", 0.0, 1.0, "share of the weight that the pattern puts on the left foot"),
+        Field("phase", 1, "1", 0.0, 1.0, "progress within a stride of two steps; 0 while standing"),
+    )
+)
+GROUND_FORCE = Field(
+    "ground_force", 6, "N", -1e4, 1e4, "force of the ground on the left and the right foot, world axes"
+)
+ACTION = Layout(
+    (Field("tau", N_JOINTS, "Nm", -robot.TORQUE_LIMIT, robot.TORQUE_LIMIT, "leg joint torques, left then right"),)
+)
+
+_RIGHT_LEG = {f"q{i + 1}": N_JOINTS // 2 + i for i in range(N_JOINTS // 2)}  # what the thesis' tables show
+TRACKING = Tracking(
+    errors=(Tracked("deg", 180.0 / math.pi, _RIGHT_LEG, lambda fields: fields["q_ref"] - fields["q"]),),
+    norm=False,
+    band=math.radians(0.5),
+    efforts=(Effort("torque", "nm", "tau_applied", slice(N_JOINTS), _RIGHT_LEG),),
+    power=lambda fields: np.abs(fields["tau_applied"] * fields["qd"]).sum(axis=-1),
+    limited="tau_applied",
+    near=0.0,
+    tde_errors={"tde_error_rms": "sigma"},
+    means={"robust_gain_mean": "c"},
+    told=("foot_loads",),
+    speed=lambda fields: fields["base_velocity"][..., 0],
+)
+
+REWARD_SCALES: dict[str, float] = {
+    "alive": 1.0,
+    "tracking": 2.0,
+    "upright": 0.5,
+    "effort": -0.05,
+    "smoothness": -0.05,
+}
+"""The reward of a control period L is L times the sum of these scales times their terms (see `DOCUMENTATION`)."""
+FALL_REASONS = ("tilt", "height", "speed")
+
+Number = TypeVar("Number", float, Array)
+
+DOCUMENTATION = """\
+## Action
+`Box(-40, 40, (12,), float64)`, joint torques in Nm, left leg then right leg, each q1..q6 = hip yaw, hip roll, hip
+pitch, knee, ankle pitch, ankle roll. Held for one control period; clipped to the bounds. Use Gymnasium's
+`RescaleAction` for [-1, 1].
+
+## Observation
+{observation}
+
+`tau_applied` is what really acted, after saturation: the time-delay estimate needs just that.
+
+## Reward
+Over a control period L, L times the sum of scale x term; each term is in `info["reward_terms"]`:
+
+| term | scale | value |
+|---|---|---|
+| `alive` | 1 | 1 |
+| `tracking` | 2 | exp(-|e|^2 / 0.02), e = q_ref - q in rad |
+| `upright` | 0.5 | exp(-tilt^2 / 0.05) |
+| `effort` | -0.05 | mean of (tau / 40 Nm)^2 |
+| `smoothness` | -0.05 | mean of (change of tau / 40 Nm)^2 |
+
+A walk of 58 s without an error earns a little under 203.
+
+## Start
+The robot stands on both feet in the pattern's first pose, at rest, in balance with its payload.
+
+## End
+*Terminated* when it has fallen: tilt above 35 degrees (`info["fall_reason"] == "tilt"`), base below 0.25 m
+(`"height"`), or joint speeds whose norm passes 200 rad/s (`"speed"`: it has diverged). *Truncated* at the end of the
+walk.
+
+## Arguments
+| name | default | allowed | meaning |
+|---|---|---|---|
+| `disturbances` | {default} | see `artde_gym.disturbances` | what happens besides; `{{}}` for nothing |
+| `control_period` | 0.001 | whole multiples of 0.001 s up to 0.05 | time between two actions, L |
+| `actuator_inertia` | "rotor" | "rotor", "lumped", "none" | geared rotors, discs (3x faster), nothing |
+| `arms` | "fixed" | "fixed", "revolute" | all 20 joints with "revolute": arms held by motors |
+| `self_collision` | False | False, True | whether the feet stop each other, or overlap |
+| `speed` | 0.1 | 0 to 0.25 m/s | walking speed |
+| `step_duration` | 1.0 | 0.6 to 2 s | time of one step |
+| `duration` | 58.0 | from 0.1 s | length of the walk |
+| `observe_ground_force` | False | False, True | append the ground's force on each foot to the observation |"""
+"""What the pages of all environments share, with `{observation}` and `{default}` filled in; their own arguments follow."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Walk:
+    """What is the same in all episodes of an environment.
+
+    Attributes:
+        nominal_robot: as controllers know it.
+        robot: as it is simulated.
+        pattern: what is walked.
+        substeps: physics steps of a control period.
+        plan: what the observation takes from the pattern, one row a control period: (samples, 38).
+        position: of the base at the start (m), the robot standing upright.
+        stand: joint torques (12,) (Nm) that balance the pattern's first pose.
+        damping: of the joints while the robot settles (Nm s/rad).
+    """
+
+    nominal_robot: RobotSpec
+    robot: RobotSpec
+    pattern: WalkingPattern
+    substeps: int
+    plan: Array
+    position: Vector
+    stand: Array
+    damping: float
+
+    @classmethod
+    def of(
+        cls,
+        control_period: float,
+        actuator_inertia: ActuatorInertia,
+        arms: Arms,
+        self_collision: bool,
+        speed: float,
+        step_duration: float,
+        duration: float,
+    ) -> Walk:
+        """From the arguments of an environment.
+
+        Raises:
+            OptionError: for an argument out of range.
+        """
+        nominal = ojas(actuator_inertia)
+        model = dataclasses.replace(ojas(actuator_inertia, arms=arms), feet_collide=self_collision)
+        substeps = steps_per_period(control_period, TIME_STEP)
+        pattern = walking_pattern(speed, step_duration, duration, TIME_STEP)
+        columns = (pattern.q, pattern.qd, pattern.qdd, pattern.load_left[:, None], pattern.phase[:, None])
+        plan = np.concatenate([column[::substeps] for column in columns], axis=1)
+        hip_height = robot.ANKLE_HEIGHT + hip_height_above_ankle(speed)
+        rest = np.zeros(N_JOINTS)
+        stand = Supported(nominal).torque(0.5, pattern.q[0], rest, rest)
+        damping = BARE_DAMPING if actuator_inertia == "none" else SETTLE_DAMPING
+        place = (float(pattern.base[0, 0]), 0.0, hip_height)
+        return cls(nominal, model, pattern, substeps, plan, place, stand, damping)
+
+    @property
+    def start(self) -> Array:
+        """Joint angles (12,) (rad) at the start."""
+        return self.pattern.q[0]
+
+    @property
+    def control_period(self) -> float:
+        return self.substeps * TIME_STEP
+
+    @property
+    def last(self) -> int:
+        """The control period with which the walk ends."""
+        return len(self.plan) - 1
+
+    def parse(self, disturbances: Mapping[str, Any]) -> Disturbances:
+        """Read disturbances of this robot."""
+        sites = [name for name, _, _ in self.robot.sites]
+        return Disturbances.parse(disturbances, sites, self.nominal_robot.actuated, self.nominal_robot.name)
+
+    def set_up(self, world: World, realised: Mapping[str, Any]) -> None:
+        """Give a world what was drawn for it, the payload excepted."""
+        world.set_friction(realised.get("friction", {}).get("coefficient", FRICTION))
+        world.set_gravity(gravity(**realised.get("slope", {})))
+        world.scale_masses(realised.get("mass_error", {}).get("factor", 1.0))
+
+    def pose(self, realised: Mapping[str, Any]) -> Array:
+        """Joint angles (12,) (rad) in which the robot is to settle."""
+        pose = self.start.copy()
+        for entry in realised.get("initial_pose", ()):
+            pose[self.nominal_robot.actuated.index(entry["joint"])] += entry["offset"]
+        return pose
+
+    def hold(self, pose: Array, q: Array, qd: Array) -> Array:
+        """Torques (..., 12) (Nm) of springs on the joints, under which the robot settles in a pose.
+
+        Springs share the load of the two legs evenly. A rigid hold would not: the legs and the ground are a closed
+        chain, in which any start error turns into antagonistic torques of several Nm.
+        """
+        return self.stand + SETTLE_STIFFNESS * (pose - q) - self.damping * qd
+
+
+def settling(realised: Mapping[str, Any]) -> int:
+    """Time steps that a robot at rest on level ground needs to come to rest again with what was drawn."""
+    if not realised.keys().isdisjoint(("slope", "initial_pose")):
+        return SETTLE_POSE_STEPS
+    return 0 if realised.keys().isdisjoint(("payload", "friction", "mass_error")) else SETTLE_STEPS
+
+
+def reward_terms(
+    error: Number, tilt: Number, effort: Number, change: Number, exp: Callable[[Number], Number]
+) -> dict[str, Number]:
+    """The reward's terms in the order of `REWARD_SCALES`, elementwise.
+
+    Args:
+        error: squared norm of the tracking error (rad^2).
+        tilt: squared angle of the tilt (rad^2).
+        effort, change: squared norms of the torques and of what they changed in a control period (Nm^2).
+        exp: the exponential function for this kind of number.
+    """
+    return {
+        "alive": 0.0 * tilt + 1.0,
+        "tracking": exp(-error / 0.02),
+        "upright": exp(-tilt / 0.05),
+        "effort": effort * _EFFORT_SCALE,
+        "smoothness": change * _EFFORT_SCALE,
+    }
+
+
+def falls(quat_xyzw: tuple[Number, Number, Number, Number], height: Number, speed: Number) -> tuple[Any, Any, Any]:
+    """Whether each of `FALL_REASONS` holds, elementwise; a state that is no number any more has fallen.
+
+    Args:
+        quat_xyzw: attitude of the base.
+        height: of the base (m).
+        speed: squared norm of the joint velocities (rad^2/s^2).
+    """
+    x, y, _, _ = quat_xyzw
+    up = 1.0 - 2.0 * (x * x + y * y)  # the world's z component of the base's z axis
+    return (up >= _COS_FALL) ^ True, height < FALL_HEIGHT, (speed <= MAX_SPEED * MAX_SPEED) ^ True
+
+
+def observation_layout(ground_force: bool) -> Layout:
+    """The observation, with the ground's force on each foot or without."""
+    return Layout((*OBSERVATION.fields, GROUND_FORCE)) if ground_force else OBSERVATION
+
+
+def gravity(pitch_deg: float = 0.0, roll_deg: float = 0.0) -> Vector:
+    """Free fall in the axes of a ground that rises by `pitch_deg` ahead and by `roll_deg` to the left."""
+    ahead, left = math.tan(math.radians(pitch_deg)), math.tan(math.radians(roll_deg))
+    size = GRAVITY / math.sqrt(1.0 + ahead * ahead + left * left)
+    return (-size * ahead, -size * left, -size)
+
+
+_COS_FALL = math.cos(math.radians(FALL_TILT_DEG))
+_EFFORT_SCALE = 1.0 / (N_JOINTS * robot.TORQUE_LIMIT**2)

@@ -1,0 +1,151 @@
+"""Many robots at once in MuJoCo, each in a world of its own: `mujoco.batch`, which steps them on a pool of threads.
+
+A world does the same to the bit as `MujocoEngine` does to one robot, whatever the number of worlds and of threads.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+from numpy.typing import NDArray
+
+from artde_gym.arrays import Array
+from artde_gym.robots.spec import RobotSpec, Vector
+from artde_gym.sim.mujoco_world import FIELDS, Blueprint, Fields, MujocoWorld
+from artde_gym.sim.rotation import rotated
+
+mj: Any = mujoco  # compiled, without type information
+
+Ids = NDArray[np.int32]
+"""Numbers of worlds, each once and in order."""
+
+
+class States(NamedTuple):
+    """Robots at one instant, as in `artde_gym.sim.engine.State`: `q` and `qd` (n, joints), the others (3 or 4, n)."""
+
+    q: Array
+    qd: Array
+    position: Array
+    quat_xyzw: Array
+    velocity: Array
+    angular_velocity: Array
+
+
+class MujocoBatch:
+    """`n` worlds of one robot.
+
+    Args:
+        spec: of the robot.
+        n: number of worlds.
+        time_step: of the physics (s).
+        threads: that step the worlds, the caller's included.
+
+    Attributes:
+        worlds: what can be done to each of them.
+
+    Raises:
+        RobotError: for a robot whose rotors are links.
+    """
+
+    def __init__(self, spec: RobotSpec, n: int, time_step: float, threads: int) -> None:
+        self._blueprint = blueprint = Blueprint(spec, time_step)
+        self._joints = blueprint.joints
+        self._batch = batch = Batch(blueprint.model, n, threads)
+        self._pose, self._twist, self._torque = (batch.bind(name) for name in ("qpos", "qvel", "qfrc_applied"))
+        self._sensors = batch.bind("sensordata")
+        self._forces = np.zeros(self._sensors.shape)  # as of `_sensors`, and those of restored snapshots
+        self._place = mj.MjData(blueprint.model)
+        self._pushed: list[_Row] = []
+        fields = [*map(batch.expand, FIELDS), batch.bind("xfrc_applied")]
+        self._friction = fields[FIELDS.index("pair_friction")]
+        self.worlds = [_Row(self, i, Fields(*(field[i] for field in fields))) for i in range(n)]
+        self._snapshots: list[tuple[Array, Array, Array]] = []
+
+    def place(self, world: int, position: Vector, q: Array) -> None:
+        """Put the upright robot of a world at `position` (m), the joints at `q`, all at rest, without a payload."""
+        self.worlds[world].release_payload()
+        self._batch.reset(np.array([world]), stage=mj.mjtStage.mjSTAGE_NONE)
+        self._pose[world, :7] = (*position, 1.0, 0.0, 0.0, 0.0)
+        self._pose[world, 7:][self._joints] = q
+
+    def snapshot(self, world: int) -> int:
+        """Remember the state of a world without a payload; returns a handle."""
+        parts = (self._batch.state, self._forces, self._friction)
+        state, forces, friction = (part[world].copy() for part in parts)
+        self._snapshots.append((state, forces, friction))
+        return len(self._snapshots) - 1
+
+    def restore(self, worlds: Ids, snapshot: int) -> None:
+        """Return to a snapshot in some worlds, bit for bit; payloads are gone."""
+        for world in worlds.tolist():
+            self.worlds[world].release_payload()
+        self._batch.state[worlds], self._forces[worlds], self._friction[worlds] = self._snapshots[snapshot]
+
+    def read(self) -> States:
+        """The states now; views, where possible, of what the next step changes."""
+        pose, twist = self._pose.T, self._twist.T
+        quat = pose[[4, 5, 6, 3]]
+        x, y, z = rotated(twist[3:6], quat)
+        q, qd = self.joints()
+        return States(q, qd, pose[:3], quat, twist[:3], np.stack([x, y, z]))
+
+    def joints(self, worlds: Ids | slice = slice(None)) -> tuple[Array, Array]:
+        """q and qd (n, joints) of some worlds; of all of them views."""
+        return self._pose[worlds, 7:][:, self._joints], self._twist[worlds, 6:][:, self._joints]
+
+    def step(self, tau: Array, worlds: Ids | None = None, steps: int = 1) -> None:
+        """Advance some worlds, or all, by so many time steps under torques `tau` (worlds, joints) (Nm)."""
+        if worlds is None:
+            self._torque[:, 6:][:, self._joints] = tau
+            self._batch.step(nstep=steps)
+            self._forces[:] = self._sensors
+        else:
+            torque = self._torque[worlds]
+            torque[:, 6:][:, self._joints] = tau
+            self._torque[worlds] = torque
+            self._batch.step(worlds, steps)
+            self._forces[worlds] = self._sensors[worlds]
+        for row in self._pushed:
+            row.forget_pushes()
+        self._pushed = []
+
+    def foot_loads(self) -> Array:
+        """Normal forces on the feet during the last step (n, feet) (N); a view."""
+        return self._forces[:, 2::3]
+
+    def ground_forces(self) -> Array:
+        """Forces of the ground on the feet during the last step (n, 3 feet) (N, world axes); a view."""
+        return self._forces
+
+    def placed(self, world: int) -> Any:
+        """See `MujocoWorld`; until the next call."""
+        self._place.qpos[:] = self._pose[world]
+        mj.mj_kinematics(self._blueprint.model, self._place)
+        return self._place
+
+
+class _Row(MujocoWorld):
+    """One world of a batch."""
+
+    def __init__(self, batch: MujocoBatch, number: int, fields: Fields) -> None:
+        super().__init__(batch._blueprint, fields)
+        self._batch, self._number, self._ids = batch, number, np.array([number], np.int32)
+
+    def placed(self) -> Any:
+        return self._batch.placed(self._number)
+
+    def masses_changed(self) -> None:
+        self._batch._batch.set_const(self._ids)
+
+    def foot_loads(self) -> tuple[float, ...]:
+        return tuple(self._batch._forces[self._number, 2::3].tolist())
+
+    def add_force(self, body: int, force: Vector, torque: Vector | NDArray[Any]) -> None:
+        super().add_force(body, force, torque)
+        self._batch._pushed.append(self)
+
+    def forget_pushes(self) -> None:
+        self._fields.pushes[:] = 0.0

@@ -1,0 +1,133 @@
+"""One robot's world in MuJoCo, as far as it differs from others: masses, payload, friction, gravity, and forces.
+
+A world lives in a model of its own, or in one row of the fields that MuJoCo keeps for each world of a batch. To find
+out where something is and to set it is the same in both.
+"""
+
+from __future__ import annotations
+
+import abc
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from artde_gym.arrays import Array
+from artde_gym.errors import RobotError
+from artde_gym.robots.mjcf import PAYLOAD, mjcf
+from artde_gym.robots.spec import RobotSpec, Vector
+from artde_gym.sim.engine import PAYLOAD_RADIUS
+
+mj: Any = mujoco  # compiled, without type information
+
+STATE = mj.mjtState.mjSTATE_INTEGRATION  # all that the next step depends on
+FIELDS = ("body_mass", "body_inertia", "body_pos", "dof_armature", "pair_friction", "opt.gravity")
+"""What worlds may have of their own, by MuJoCo's names; what follows from it comes with `masses_changed`."""
+
+
+class Blueprint:
+    """The model of a robot on a plane, and what is where in it.
+
+    Raises:
+        RobotError: for a robot whose rotors are links.
+    """
+
+    def __init__(self, spec: RobotSpec, time_step: float) -> None:
+        if spec.gears:
+            raise RobotError("gears", spec.gears, "none, rotors being armature; engine 'bullet' couples rotor links")
+        self.spec = spec
+        self.model = model = mj.MjModel.from_xml_string(mjcf(spec))
+        model.opt.timestep = time_step
+        self.bodies = [model.body(link.name).id for link in spec.links]
+        self.base = self.bodies[0]
+        self.payload = model.body(PAYLOAD).id
+        self.sites = {name: model.site(name).id for name, _, _ in spec.sites}
+        # MuJoCo numbers the coordinates of the base first, and those of joints by the tree
+        self.joints = _span([model.joint(name).dofadr[0] - 6 for name in spec.actuated])
+        self.mass, self.inertia = model.body_mass.copy(), model.body_inertia.copy()
+        self.armature = model.dof_armature.copy()
+
+
+class Fields(NamedTuple):
+    """`FIELDS` of one world, and `pushes`, its applied forces and torques at the centres of mass (bodies, 6)."""
+
+    body_mass: Array
+    body_inertia: Array
+    body_pos: Array
+    dof_armature: Array
+    pair_friction: Array
+    gravity: Array
+    pushes: Array
+
+
+class MujocoWorld(abc.ABC):
+    """A world as the protocol `artde_gym.sim.engine.World` has it."""
+
+    def __init__(self, blueprint: Blueprint, fields: Fields) -> None:
+        self.spec = blueprint.spec
+        self.held: Vector | None = None  # where the payload is on the base
+        self._blueprint, self._fields = blueprint, fields
+        self._mass_factor = 1.0
+
+    @abc.abstractmethod
+    def placed(self) -> Any:
+        """MuJoCo's data with the places of bodies and sites now."""
+
+    @abc.abstractmethod
+    def masses_changed(self) -> None:
+        """Bring what the constraint solver knows of the masses up to date."""
+
+    @abc.abstractmethod
+    def foot_loads(self) -> tuple[float, ...]: ...
+
+    def push(self, site: str, force: Vector) -> None:
+        sites = self._blueprint.sites
+        if site not in sites:
+            raise RobotError("site", site, ", ".join(map(repr, sites)))
+        data, number = self.placed(), sites[site]
+        body = self._blueprint.model.site_bodyid[number]
+        arm = data.site_xpos[number] - data.xipos[body]
+        self.add_force(body, force, np.cross(arm, force))
+
+    def add_force(self, body: int, force: Vector, torque: Vector | NDArray[Any]) -> None:
+        """Add a force and a torque (world axes) at a body's centre of mass, for the next step only."""
+        self._fields.pushes[body] += (*force, *torque)
+
+    def set_friction(self, coefficient: float) -> None:
+        self._fields.pair_friction[:, :2] = coefficient
+
+    def set_gravity(self, gravity: Vector) -> None:
+        self._fields.gravity[:] = gravity
+
+    def scale_masses(self, factor: float) -> None:
+        if factor == self._mass_factor:
+            return
+        self._mass_factor = factor
+        nominal, fields = self._blueprint, self._fields
+        fields.body_mass[nominal.bodies] = factor * nominal.mass[nominal.bodies]
+        fields.body_inertia[nominal.bodies] = factor * nominal.inertia[nominal.bodies]
+        fields.dof_armature[:] = factor * nominal.armature
+        self.masses_changed()
+
+    def attach_payload(self, mass: float, position: Vector) -> None:
+        self.held = position
+        self._fields.body_pos[self._blueprint.payload] = position
+        self._weigh_payload(mass)
+
+    def release_payload(self) -> None:
+        if self.held is not None:
+            self.held = None
+            self._weigh_payload(0.0)
+
+    def _weigh_payload(self, mass: float) -> None:
+        payload = self._blueprint.payload
+        self._fields.body_mass[payload] = mass
+        self._fields.body_inertia[payload] = 0.4 * mass * PAYLOAD_RADIUS**2
+        self.masses_changed()
+
+
+def _span(numbers: list[int]) -> slice | list[int]:
+    """Consecutive numbers as a slice, which is faster to index by."""
+    first = numbers[0] if numbers else 0
+    return slice(first, first + len(numbers)) if numbers == list(range(first, first + len(numbers))) else numbers
