@@ -87,12 +87,12 @@ def push(magnitude: Any, direction: Any = None, start: Any = None, duration: Any
 
 
 def _pushed(level: float, payload: float, unpushed: int) -> dict[str, Any]:
-    """Two pushes of up to 15 N at first and 35 N in the end; `unpushed` of ten of each are none at all."""
-    sizes = {"choice": [0.0] * unpushed + np.linspace(10.0, 15.0 + 20.0 * level, 10 - unpushed).round(2).tolist()}
+    """Two pushes of up to 20 N at first and 35 N in the end; `unpushed` of ten of each are none at all."""
+    sizes = {"choice": [0.0] * unpushed + np.linspace(14.0, 20.0 + 15.0 * level, 10 - unpushed).round(2).tolist()}
     return {
         "push": [
-            push(sizes, start=_uniform(2.3, 4.3), duration=_uniform(0.15, 0.25)),
-            push(sizes, start=_uniform(5.0, 6.2), duration=_uniform(0.15, 0.25)),
+            push(sizes, start=_uniform(2.1, 4.1), duration=_uniform(0.15, 0.25)),
+            push(sizes, start=_uniform(4.6, 5.6), duration=_uniform(0.15, 0.25)),
         ],
         "payload": {
             "mass": _uniform(0.001, payload),
@@ -126,7 +126,7 @@ _FLIGHT_PPO = {
 }
 _WALK_PPO = {
     "n_steps": 128,
-    "batch_size": 1024,
+    "batch_size": 512,
     "n_epochs": 6,
     "learning_rate": 5e-4,
     "gamma": 0.99,
@@ -145,7 +145,7 @@ _BIPED: dict[str, Any] = {
     "ppo": _WALK_PPO,
     "sac": {**_SAC, "gamma": 0.99},
     "rollouts": 8,
-    "level": 0.2,
+    "level": 0.3,
 }
 
 TASKS: dict[str, Task] = {

@@ -8,7 +8,7 @@ import pytest
 
 import artde_gym  # noqa: F401  # registers the environments
 import controllers
-from artde_gym.envs.biped import OBSERVATION
+from artde_gym.envs.biped_task import OBSERVATION
 from artde_gym.envs.quadrotor_task import ACTION
 from artde_gym.errors import ActionError, OptionError
 from artde_gym.registration import registered_controllers

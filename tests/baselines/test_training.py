@@ -190,22 +190,29 @@ def test_the_adapter_is_what_the_single_environment_is():
     single.close()
 
 
-def bipeds(count: int, **kwargs: Any) -> ResidualVecEnv:
-    pushes = [{"body": "chest", "magnitude": 60.0, "direction": ANYWHERE, "start": {"uniform": [0.05, 0.4]}}]
-    more = {"duration": 1.2, "self_collision": True, "disturbances": {"push": pushes, "payload": 0.5}, **kwargs}
-    return batched("BipedPush-v0", Recipe("ojas"), count, more)
-
-
 ANYWHERE = [{"normal": [0.0, 1.0]}, {"normal": [0.0, 1.0]}, 0.0]
+FALLING = {
+    "duration": 1.2,
+    "self_collision": True,
+    "disturbances": {
+        "push": [
+            {
+                "body": "chest",
+                "magnitude": {"choice": [0.0, 60.0]},
+                "direction": ANYWHERE,
+                "start": {"uniform": [0.05, 0.4]},
+            }
+        ],
+        "payload": 0.5,
+    },
+}
 
 
 def test_the_adapter_is_the_single_biped_to_the_bit():
     """Falls within a decision, and what begins after them, included."""
     pytest.importorskip("mujoco")
-    vector = bipeds(3)
-    single = ResidualEnv(
-        gym.make("BipedPush-v0", disable_env_checker=True, engine="mujoco", **vector.env.spec.kwargs), Recipe("ojas")
-    )
+    vector = batched("BipedPush-v0", Recipe("ojas"), 3, FALLING)
+    single = ResidualEnv(gym.make("BipedPush-v0", disable_env_checker=True, engine="mujoco", **FALLING), Recipe("ojas"))
     vector.seed(7)
     many: Any = vector.reset()
     one, _ = single.reset(seed=9)
@@ -231,8 +238,8 @@ def test_the_adapter_says_what_it_cannot_do():
     assert VecMonitor(env).num_envs == 2
     with pytest.raises(OptionError, match="none: they share one environment"):
         env.set_attr("x", 1)
-    with pytest.raises(OptionError, match=r"hold is 0\.03"):
-        ResidualVecEnv(batch(2, duration=1.0), Recipe("q450", hold=0.03))
+    with pytest.raises(OptionError, match=r"hold is 0\.02"):
+        ResidualVecEnv(batch(2, duration=1.0), Recipe("q450", hold=0.02))
     env.close()
 
 
