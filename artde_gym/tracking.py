@@ -66,7 +66,7 @@ class Tracking:
         near: share of the field's range that counts as at the bound; a lag approaches it without reaching it.
         tde_errors: column -> diagnostic of a policy that is an error of time-delay estimation.
         means: column -> diagnostic of a policy, one number, whose mean is reported.
-        told: entries of `info` that belong into an episode's traces too (not in the batch backend).
+        told: entries of `info` that belong into an episode's traces too.
         speed: observations -> speed of travel (...), m/s, where a cost of transport makes sense.
     """
 

@@ -48,7 +48,14 @@ class Mocap:
         self._kappa = 0.5 * (math.sqrt(ratio**2 + 4 * ratio) - ratio)
 
     def measure(
-        self, position: Array, velocity: Array, rot: Array, rates: Array, sample: NDArray[np.int64], keys: Integers
+        self,
+        position: Array,
+        velocity: Array,
+        rot: Array,
+        rates: Array,
+        sample: NDArray[np.int64],
+        keys: Integers,
+        new: NDArray[np.bool_] | None = None,
     ) -> None:
         """Replace the truth by what is known of it.
 
@@ -57,7 +64,9 @@ class Mocap:
             rot: body to world (3, 3, n), changed in place.
             sample: how many control periods since the start of the episode (n,); at 0 the observer has settled.
             keys: of each vehicle's noise (n,).
+            new: whether this sample is looked at for the first time (n,); all are without. The others' stay as known.
         """
+        before = self._known()
         period = self._period
         noise = normal_noise(keys, sample.astype(np.uint64), 12).astype(position.dtype)
         reading = rates + GYROSCOPE_NOISE * noise[0:3]
@@ -80,7 +89,13 @@ class Mocap:
         self._velocity = np.where(start, velocity, speed + self._beta_rate * error)
         self._rot = np.where(start, rot, turned(attitude, self._kappa * error_rot))
         self._rates = reading
+        if new is not None:
+            chosen = (np.where(new, now, then) for now, then in zip(self._known(), before, strict=True))
+            self._position, self._velocity, self._rot, self._rates, self._true_velocity = chosen
         position[:], velocity[:], rot[:], rates[:] = self._position, self._velocity, self._rot, self._rates
+
+    def _known(self) -> tuple[Array, ...]:
+        return self._position, self._velocity, self._rot, self._rates, self._true_velocity
 
 
 def tracking_gains(index: float) -> tuple[float, float]:

@@ -166,7 +166,7 @@ class BipedVectorEnv(BatchEnv):
         torques = commands.copy()
         together = everybody if steps == 1 else busy
         for i in busy.tolist():
-            self._course(i).begin(commands[i])
+            self._course(i).begin(commands[i].copy())
         for step in range(steps):
             for i in busy.tolist():
                 told: list[str] = []

@@ -126,7 +126,7 @@ class QuadInfinityPayloadVectorEnv(BatchEnv):
 
     def _measure(self, observations: Array, new: Mask) -> None:
         if not self._sensors.ideal:
-            self._sensors.measure(observations.T, self._k)
+            self._sensors.measure(observations.T, self._k, None if new.all() else new)
 
     def _score(self, truth: Array) -> tuple[dict[str, Array], Sequence[Mask]]:
         terms = {name: np.empty(self.num_envs, self.dtype) for name in task.REWARD_SCALES}

@@ -45,14 +45,18 @@ class Sensors:
         """Whether what is measured is the truth."""
         return self._mocap is None and self._noise is None
 
-    def measure(self, observation: Array, sample: NDArray[np.int64]) -> None:
-        """Replace the truth in observations (size, n) by what is measured, `sample` periods after the start (n,)."""
+    def measure(self, observation: Array, sample: NDArray[np.int64], new: NDArray[np.bool_] | None = None) -> None:
+        """Replace the truth in observations (size, n) by what is measured, `sample` periods after the start (n,).
+
+        `new` (n,) says where a sample is looked at for the first time; without, everywhere.
+        """
         measured = (
             observation[POSITION],
             observation[VELOCITY],
             observation[ROT].reshape(3, 3, -1),  # a view, as rows lie apart by the same distance
             observation[RATES],
         )
-        for sensor, keys in ((self._mocap, self._keys[0]), (self._noise, self._keys[1])):
-            if sensor is not None:
-                sensor.measure(*measured, sample, keys)
+        if self._mocap is not None:
+            self._mocap.measure(*measured, sample, self._keys[0], new)
+        if self._noise is not None:
+            self._noise.measure(*measured, sample, self._keys[1])

@@ -9,7 +9,18 @@ import numpy as np
 
 from artde_gym.arrays import Array
 from artde_gym.evaluation.metrics import Span
-from artde_gym.evaluation.rollout import PROGRESS_INTERVAL, Episode, Policy, metrics_for, row_of, stack, traces_of
+from artde_gym.evaluation.rollout import (
+    PROGRESS_INTERVAL,
+    Episode,
+    Policy,
+    diagnosed_every,
+    metrics_for,
+    row_of,
+    stack,
+    traces_of,
+)
+
+BLOCK = 4096  # samples of all episodes together that metrics take in at once: a call has its price
 
 
 def run_batch(
@@ -40,6 +51,7 @@ def run_batch(
     stride = max(1, round(1.0 / (trace_hz * period)))
     report_every = max(1, round(PROGRESS_INTERVAL / period))
     diagnose = getattr(policy, "diagnostics", None)
+    looks = diagnosed_every(env, stride)
     split = env.observation_layout.split
 
     observation, info = env.reset(seed=list(seeds))
@@ -48,23 +60,34 @@ def run_batch(
     live = np.ones(len(seeds), dtype=np.bool_)
     steps, total = np.zeros(len(seeds), dtype=np.int64), np.zeros(len(seeds))
     reasons: dict[int, str] = {}
-    observations, diagnostics = [observation[:traced].copy()], []
+
+    def told() -> dict[str, Array]:
+        return {name: np.array(info[name][:traced]) for name in env.tracking.told}
+
+    observations, tales, diagnostics = [observation[:traced].copy()], [told()], []
+    block: list[Array] = []
+    insides: list[dict[str, Array]] = []
     state, episode_start, k = None, live, 0
     while live.any():
         action, state = policy.predict(observation, state=state, episode_start=episode_start, deterministic=True)
-        inside = {} if diagnose is None else diagnose(state)
-        metrics.add(k, _sample(split(observation)), _sample(inside), live)
-        if traced and k % stride == 0:
-            diagnostics.append({name: values[:traced].copy() for name, values in inside.items()})
+        block.append(observation)
+        if diagnose is not None and k % looks == 0:
+            insides.append(diagnose(state))
+            if traced and k % stride == 0:
+                diagnostics.append({name: values[:traced].copy() for name, values in insides[-1].items()})
         observation, reward, terminated, truncated, info = env.step(action)
         k += 1
         total += np.where(live, reward, 0.0)
         if traced and k % stride == 0:
             observations.append(observation[:traced].copy())
+            tales.append(told())
         episode_start = terminated | truncated
         ended = live & episode_start
+        if ended.any() or len(block) * len(seeds) >= BLOCK:
+            metrics.add(k - len(block), split(np.array(block)), stack(insides), live)
+            block, insides = [], []
         if ended.any():
-            metrics.add(k, _sample(split(observation)), None, ended)  # nothing is decided there any more
+            metrics.add(k, split(observation[None]), None, ended)  # nothing is decided there any more
             steps[ended] = k
             reasons |= {int(i): info["fall_reason"][i] for i in np.flatnonzero(live & terminated)}
             live = live & ~ended
@@ -77,13 +100,11 @@ def run_batch(
         if i < traced:
             seen, decided = int(steps[i]) // stride + 1, int(steps[i] - 1) // stride + 1
             fields = split(np.array([sample[i] for sample in observations[:seen]]))
-            own = stack([{name: values[i] for name, values in sample.items()} for sample in diagnostics[:decided]])
-            traces = traces_of(stride * period, fields, own)
+            known, own = (
+                stack([{name: values[i] for name, values in sample.items()} for sample in samples])
+                for samples in (tales[:seen], diagnostics[:decided])
+            )
+            traces = traces_of(stride * period, fields | known, own)
         row = row_of(reasons.get(i), float(steps[i] * period), float(total[i]), row, disturbances[i])
         episodes.append(Episode(row, traces))
     return episodes
-
-
-def _sample(signals: dict[str, Array]) -> dict[str, Array]:
-    """One sample as a block."""
-    return {name: values[None] for name, values in signals.items()}

@@ -66,12 +66,14 @@ def single(env_id: str, arguments: str) -> Any:
 
 
 def vector(env_id: str, arguments: str, size: int) -> Any:
-    """A vector of `size` environments by id and JSON arguments.
+    """A vector of `size` environments by id and JSON arguments; where it can wait, episodes that are over do.
 
     Raises:
         OptionError: as of `single`, or for an environment that has no vector of its own.
     """
     given = _checked(env_id, arguments, "batch")
+    if "autoreset" in arguments_of(env_id, "batch"):
+        given = {"autoreset": False, **given}
     return gym.make_vec(env_id, size, vectorization_mode="vector_entry_point", **given)
 
 

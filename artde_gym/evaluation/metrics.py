@@ -127,10 +127,10 @@ class Metrics:
         acted = _part(1, END, start)  # what the first observation tells of acted before this episode
         low, high = self._limits
         values = fields[tracking.limited][acted]
-        self._saturated += _sum(np.any((values <= low) | (values >= high), axis=-1), live)
-        self._energy += _sum(tracking.power(fields)[acted], live)
+        self._saturated = _added(self._saturated, np.any((values <= low) | (values >= high), axis=-1), live)
+        self._energy = _added(self._energy, tracking.power(fields)[acted], live)
         if tracking.speed is not None:
-            self._distance += _sum(tracking.speed(fields), live)
+            self._distance = _added(self._distance, tracking.speed(fields), live)
         for column, name in tracking.tde_errors.items():
             if diagnostics is not None and name in diagnostics:
                 self._sigmas[column].add(diagnostics[name], live)
@@ -143,8 +143,8 @@ class Metrics:
         absolute = (size if self._tracking.norm else np.abs(error).mean(axis=-1))[_part(1, END, start)]
         time = self._period * np.arange(max(start, 1), start + len(error))
         self._size.add(size[..., None], live)
-        self._iae += _sum(absolute, live)
-        self._itae += _sum(time[:, None] * absolute, live)
+        self._iae = _added(self._iae, absolute, live)
+        self._itae = _added(self._itae, time[:, None] * absolute, live)
         for event in self._events.values():
             event.add(size, start, live)
 
@@ -195,7 +195,7 @@ class _Squares:
     def add(self, values: Array, live: Mask | None) -> None:
         """Take in (samples, n, size)."""
         squares = np.square(values)
-        self._sums = self._sums + _sum(squares, live)
+        self._sums = _added(self._sums, squares, live)
         self._largest = np.fmax(self._largest, _largest(squares, live))
         self._number += len(values) if live is None else len(values) * live
 
@@ -223,7 +223,7 @@ class _Mean:
 
     def add(self, values: Array, live: Mask | None) -> None:
         """Take in (samples, n)."""
-        self._sums += _sum(values, live)
+        self._sums = _added(self._sums, values, live)
         self._number += len(values) if live is None else len(values) * live
 
     @property
@@ -242,7 +242,7 @@ class _Variation:
         """Take in (samples, n, size)."""
         if len(values):
             joined = values if self._last is None else np.concatenate([self._last, values])
-            self.total += _sum(np.abs(np.diff(joined, axis=0)).mean(axis=-1), live)
+            self.total = _added(self.total, np.abs(np.diff(joined, axis=0)).mean(axis=-1), live)
             last = values[-1:]
             self._last = last if live is None or self._last is None else np.where(live[:, None], last, self._last)
 
@@ -303,10 +303,11 @@ def _part(first: int, stop: int, start: int) -> slice:
     return slice(max(first - start, 0), max(stop - start, 0))
 
 
-def _sum(values: Array | Mask, live: Mask | None) -> Array:
-    """Sum over a block's samples (samples, n, ...); zero in other episodes."""
-    total = values.sum(axis=0)
-    return total if live is None else np.where(_beside(live, total), total, 0)
+def _added(before: Array, values: Array | Mask, live: Mask | None) -> Array:
+    """A sum (n, ...) with a block's samples (samples, n, ...) added one by one, so that no bit depends on the blocks."""
+    start = np.broadcast_to(before, values.shape[1:])
+    total = np.add.accumulate(np.concatenate([start[None], values]), axis=0)[-1]
+    return total if live is None else np.where(_beside(live, total), total, start)
 
 
 def _largest(values: Array, live: Mask | None) -> Array:

@@ -55,7 +55,7 @@ def run_episode(
     stride = max(1, round(1.0 / (trace_hz * period)))
     report_every = max(1, round(PROGRESS_INTERVAL / period))
     diagnose = getattr(policy, "diagnostics", None)
-    diagnosed_every = 1 if plant.tracking.diagnosed else stride
+    looks = diagnosed_every(plant, stride)
 
     observation, info = env.reset(seed=seed, options=options)
     disturbances = info["disturbances"]
@@ -67,7 +67,7 @@ def run_episode(
         action, state = policy.predict(observation, state=state, episode_start=episode_start, deterministic=True)
         episode_start = False
         count = len(observations)
-        if diagnose is not None and (count - 1) % diagnosed_every == 0:
+        if diagnose is not None and (count - 1) % looks == 0:
             diagnostics.append(diagnose(state))
         observation, reward, terminated, truncated, info = env.step(action)
         total += float(reward)
@@ -85,9 +85,14 @@ def run_episode(
     metrics.add(last, _part(fields, np.s_[last:, None]), None)  # nothing was decided there any more
     reason = info.get("fall_reason", "") if terminated else None
     row = row_of(reason, info["time_s"], total, metrics.rows()[0], disturbances)
-    kept = slice(None, None, stride // diagnosed_every)
+    kept = slice(None, None, stride // looks)
     seen = _part(fields, slice(None, None, stride)) | stack(told)
     return Episode(row, traces_of(stride * period, seen, _part(inside, kept)))
+
+
+def diagnosed_every(plant: Any, stride: int) -> int:
+    """How many control periods lie between two looks at a policy's inside, for metrics and for traces of a stride."""
+    return 1 if plant.tracking.diagnosed else stride
 
 
 def metrics_for(plant: Any, disturbances: Sequence[Mapping[str, Any]], phases: Sequence[Span]) -> Metrics:

@@ -13,6 +13,7 @@ from mujoco.batch import Batch
 from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
+from artde_gym.errors import RobotError
 from artde_gym.robots.spec import RobotSpec, Vector
 from artde_gym.sim.mujoco_world import FIELDS, Blueprint, Fields, MujocoWorld
 from artde_gym.sim.rotation import rotated
@@ -47,12 +48,15 @@ class MujocoBatch:
         worlds: what can be done to each of them.
 
     Raises:
-        RobotError: for a robot whose rotors are links.
+        RobotError: for a robot whose rotors are links, or whose actuated joints are not next to each other in the tree.
     """
 
     def __init__(self, spec: RobotSpec, n: int, time_step: float, threads: int) -> None:
         self._blueprint = blueprint = Blueprint(spec, time_step)
-        self._joints = blueprint.joints
+        joints = blueprint.joints
+        if not isinstance(joints, slice):
+            raise RobotError("actuated joints", spec.actuated, "joints that follow one another in the tree")
+        self._angles, self._speeds = slice(7 + joints.start, 7 + joints.stop), slice(6 + joints.start, 6 + joints.stop)
         self._batch = batch = Batch(blueprint.model, n, threads)
         self._pose, self._twist, self._torque = (batch.bind(name) for name in ("qpos", "qvel", "qfrc_applied"))
         self._sensors = batch.bind("sensordata")
@@ -69,7 +73,7 @@ class MujocoBatch:
         self.worlds[world].release_payload()
         self._batch.reset(np.array([world]), stage=mj.mjtStage.mjSTAGE_NONE)
         self._pose[world, :7] = (*position, 1.0, 0.0, 0.0, 0.0)
-        self._pose[world, 7:][self._joints] = q
+        self._pose[world, self._angles] = q
 
     def snapshot(self, world: int) -> int:
         """Remember the state of a world without a payload; returns a handle."""
@@ -94,20 +98,14 @@ class MujocoBatch:
 
     def joints(self, worlds: Ids | slice = slice(None)) -> tuple[Array, Array]:
         """q and qd (n, joints) of some worlds; of all of them views."""
-        return self._pose[worlds, 7:][:, self._joints], self._twist[worlds, 6:][:, self._joints]
+        return self._pose[worlds, self._angles], self._twist[worlds, self._speeds]
 
     def step(self, tau: Array, worlds: Ids | None = None, steps: int = 1) -> None:
         """Advance some worlds, or all, by so many time steps under torques `tau` (worlds, joints) (Nm)."""
-        if worlds is None:
-            self._torque[:, 6:][:, self._joints] = tau
-            self._batch.step(nstep=steps)
-            self._forces[:] = self._sensors
-        else:
-            torque = self._torque[worlds]
-            torque[:, 6:][:, self._joints] = tau
-            self._torque[worlds] = torque
-            self._batch.step(worlds, steps)
-            self._forces[worlds] = self._sensors[worlds]
+        rows = slice(None) if worlds is None else worlds
+        self._torque[rows, self._speeds] = tau
+        self._batch.step(worlds, steps)
+        self._forces[rows] = self._sensors[rows]
         for row in self._pushed:
             row.forget_pushes()
         self._pushed = []

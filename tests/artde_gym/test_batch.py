@@ -7,9 +7,11 @@ import json
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import pandas as pd
 import pytest
+from gymnasium.envs.registration import EnvSpec
 from typer.testing import CliRunner
 
 from artde_gym.cli import app
@@ -160,7 +162,8 @@ def test_chunks_cover_all_evenly() -> None:
 @pytest.mark.parametrize(
     ("arguments", "error", "words"),
     [
-        ({"env_id": "BipedPush-v0"}, OptionError, ["batch backend", "BipedPush-v0", QUADROTOR]),
+        ({"env_id": "BipedPush-v0", "env_kwargs": {"engine": "bullet"}}, OptionError, ["engine", "bullet", "'mujoco'"]),
+        ({"env_id": "BipedPush-v0", "env_kwargs": {"threads": 0}}, OptionError, ["threads", "0", ">= 1"]),
         ({"backend": "bach"}, OptionError, ["backend", "bach", "did you mean 'batch'"]),
         ({"traced": -1}, OptionError, ["traced", "-1"]),
         ({"env_kwargs": {"engine": "bullet"}}, OptionError, ["engine", "dtype"]),
@@ -178,6 +181,13 @@ def test_bad_arguments_are_refused_before_the_first_episode(
     for word in words:
         assert word in str(caught.value)
     assert not (tmp_path / "run").exists()
+
+
+def test_an_environment_without_a_vector_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    alone = EnvSpec("Alone-v0", entry_point="artde_gym.envs.biped_walk:BipedWalkPayloadEnv")
+    monkeypatch.setitem(gym.registry, "Alone-v0", alone)
+    with pytest.raises(OptionError, match=rf"batch backend.*Alone-v0.*BipedPush-v0.*{QUADROTOR}"):
+        evaluate(["tde"], "Alone-v0", episodes=1, backend="batch")
 
 
 @pytest.mark.parametrize(("backend", "scenarios"), [("single", ["Q1", "Q1-calm", "Q1-gale"]), ("batch", ["Q1"])])

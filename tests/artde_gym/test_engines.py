@@ -17,7 +17,7 @@ from artde_gym.robots.dynamics import RigidBodyTree
 from artde_gym.robots.ojas import ojas
 from artde_gym.robots.spec import RobotSpec, box_link
 from artde_gym.sim.engine import Camera, Engine, State
-from artde_gym.sim.factory import EngineName, make_engine
+from artde_gym.sim.factory import EngineName, make_batch, make_engine
 
 DT = 0.001
 G = 9.81
@@ -357,6 +357,15 @@ def test_an_engine_that_is_not_installed_says_how_to_get_it(monkeypatch: pytest.
     monkeypatch.delitem(sys.modules, "artde_gym.sim.mujoco_canvas", raising=False)
     with pytest.raises(OptionError, match=r"'mujoco'.*'bullet'.*artde-gym\[mujoco\]"):
         make_engine("mujoco", ojas(), DT)
+
+
+@pytest.mark.parametrize("missing", ["mujoco", "mujoco.batch"])
+def test_batches_say_what_they_need(missing: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("artde_gym.sim.mujoco_batch", "artde_gym.sim.mujoco_world"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    monkeypatch.setitem(sys.modules, missing, None)
+    with pytest.raises(OptionError, match=r"'mujoco'.*3\.17.*artde-gym\[mujoco\]"):
+        make_batch("mujoco", ojas(), 1, DT, 1)
 
 
 def test_mujoco_refuses_rotors_that_are_links() -> None:

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from artde_gym.envs.biped import ACTION, OBSERVATION
+from artde_gym.envs.biped_task import ACTION, OBSERVATION
 from artde_gym.errors import UnknownNameError
 from artde_gym.layout import Field, Layout
 

@@ -11,13 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from artde_gym.disturbances.kinds import NEVER
-from artde_gym.envs import biped, quadrotor_task
+from artde_gym.envs import biped_task, quadrotor_task
 from artde_gym.evaluation.metrics import Metrics, events_of
 from artde_gym.layout import Layout
 from artde_gym.tracking import Tracking
 
 Signals = dict[str, np.ndarray]
-BIPED = biped.TRACKING, biped.OBSERVATION
+BIPED = biped_task.TRACKING, biped_task.OBSERVATION
 QUADROTOR = quadrotor_task.TRACKING, quadrotor_task.OBSERVATION
 
 
@@ -53,7 +53,7 @@ def many(signals: Signals) -> Signals:
 
 def walk(error: np.ndarray, **given_fields: np.ndarray) -> Signals:
     """Observations whose joint error is given and all else is zero."""
-    fields = blank(biped.OBSERVATION, len(error)) | given_fields
+    fields = blank(biped_task.OBSERVATION, len(error)) | given_fields
     return fields | {"q_ref": fields["q"] + error}
 
 

@@ -23,11 +23,11 @@ def seen_and_true(pilot: Pilot, steps: int, num_envs: int = 32, **kwargs: Any) -
     """Observations of vehicles in the wind under motion capture, and their true states; (steps, n, 41)."""
     env: Any = gym.make_vec(ID, num_envs=num_envs, disturbances=WINDY, measurement="mocap", **kwargs)
     observation, _ = env.reset(seed=0)
-    seen, true = [observation], [env._truth().T]
+    seen, true = [observation], [env._truth()]
     for _ in range(steps):
         observation, *_ = env.step(pilot(observation))
         seen.append(observation)
-        true.append(env._truth().T)
+        true.append(env._truth())
     return np.array(seen), np.array(true)
 
 
@@ -106,6 +106,6 @@ def test_one_vehicle_sees_what_the_same_one_among_many_sees(pilot: Pilot) -> Non
     for _ in range(60):
         action = pilot(a)
         a, b = alone.step(action)[0], many.step(np.tile(action, (2, 1)))[0][1]
-    noise = np.abs(b[:18] - many._truth().T[1, :18])
+    noise = np.abs(b[:18] - many._truth()[1, :18])
     assert noise[:3].max() > 2e-5
     np.testing.assert_allclose(a[:18], b[:18], rtol=0, atol=1e-4)  # the same errors, on nearly the same flight

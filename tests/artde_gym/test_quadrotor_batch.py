@@ -248,8 +248,9 @@ def test_actions_of_finished_flights_are_ignored() -> None:
         env.step(np.array([[WEIGHT, 0, 0, 0], [WEIGHT, np.nan, 0, 0]]))
 
 
-def test_reset_mask_resets_some(pilot: Pilot) -> None:
-    env, other = make(3, disturbances=VARIED), make(3, disturbances=VARIED)
+@pytest.mark.parametrize("measurement", ["ideal", "mocap"])
+def test_reset_mask_resets_some(pilot: Pilot, measurement: str) -> None:
+    env, other = (make(3, disturbances=VARIED, measurement=measurement) for _ in range(2))
     a, b = env.reset(seed=0)[0], other.reset(seed=0)[0]
     for _ in range(10):
         a, b = env.step(actions_of(pilot, a))[0], other.step(actions_of(pilot, b))[0]
@@ -259,9 +260,10 @@ def test_reset_mask_resets_some(pilot: Pilot) -> None:
     assert options == {"reset_mask": mask}
     assert np.array_equal(info["_disturbances"], mask)
     assert info["disturbances"][0] is None
-    fresh, alone = single(disturbances=VARIED).reset(seed=6)
+    fresh, alone = single(disturbances=VARIED, measurement=measurement).reset(seed=6)
     assert info["disturbances"][1] == alone["disturbances"]
     np.testing.assert_allclose(a[1], fresh, rtol=0, atol=1e-12)
+    assert a[[0, 2]].tobytes() == b[[0, 2]].tobytes()
     for _ in range(20):
         a, b = env.step(actions_of(pilot, a))[0], other.step(actions_of(pilot, b))[0]
         assert a[[0, 2]].tobytes() == b[[0, 2]].tobytes()
