@@ -152,8 +152,18 @@ def register_laws() -> None:
         search="controllers.model_based:search_space",
     )
     register_controller(
+        "tde+balance",
+        "baselines.saved:make_shipped",
+        text="biped: TDE + a linear balance law of 28 gains that CMA-ES has tuned under pushes",
+        policies=dict.fromkeys(("BipedPush-v0", "BipedWalk-Payload-v0"), "biped-balance"),
+    )
+    register_controller(
         "tde+ppo",
         "baselines.saved:make_shipped",
-        text="quadrotor: TDE + a residual that reinforcement learning (PPO) has trained in a gale",
-        policies={"q450": "quadrotor-gale"},
+        text="TDE + a residual that reinforcement learning (PPO) has trained, one for each environment",
+        policies={
+            "BipedPush-v0": "biped-push",
+            "BipedWalk-Payload-v0": "biped-walk",
+            "QuadInfinity-Payload-v0": "quadrotor-gale",
+        },
     )

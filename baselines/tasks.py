@@ -128,7 +128,7 @@ _WALK_PPO = {
     "n_steps": 128,
     "batch_size": 512,
     "n_epochs": 6,
-    "learning_rate": 5e-4,
+    "learning_rate": 3e-4,
     "gamma": 0.99,
     "log_std_init": -1.3,
 }

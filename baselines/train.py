@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import functools
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from stable_baselines3 import PPO, SAC
-from stable_baselines3.common.buffers import RolloutBuffer
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.utils import set_random_seed
@@ -24,6 +24,7 @@ from baselines.export import exported
 from baselines.recipe import Recipe
 from baselines.residual import Residual
 from baselines.residual_env import ResidualEnv
+from baselines.rollouts import OpenRollouts
 from baselines.run import Progress, Run, Training, environment_kwargs, single
 from baselines.vec_env import batched
 
@@ -163,27 +164,11 @@ def _model(training: Training, env: VecNormalize, options: dict[str, Any], featu
     policy |= {name: options[name] for name in own if name in options}
     others = {name: value for name, value in options.items() if name not in own}
     if "gate" in features.slices:
-        gate = features["gate"].start
-        others["rollout_buffer_class"] = OpenRollouts
-        others["rollout_buffer_kwargs"] = {
-            "gate": lambda seen: seen[:, gate] * np.sqrt(env.obs_rms.var[gate]) + env.obs_rms.mean[gate]
-        }
+
+        def gate(seen: NDArray[Any]) -> NDArray[Any]:
+            at = features["gate"].start
+            statistics: Any = env.obs_rms
+            return seen[:, at] * np.sqrt(statistics.var[at]) + statistics.mean[at]
+
+        others |= {"rollout_buffer_class": OpenRollouts, "rollout_buffer_kwargs": {"gate": gate}}
     return PPO("MlpPolicy", env, policy_kwargs=policy, **others, **common)
-
-
-class OpenRollouts(RolloutBuffer):
-    """Rollouts of which decisions under a shut gate, which have no effect, are mostly left out."""
-
-    def __init__(self, *args: Any, gate: Callable[[Any], Any], **kwargs: Any) -> None:
-        super().__init__(*args, **kwargs)
-        self._gate = gate
-
-    def get(self, batch_size: int | None = None) -> Iterator[Any]:
-        whole = super().get(batch_size)
-        first = next(whole)  # puts the arrays into their final shape
-        counts = self._gate(self.observations) > 0.05
-        counts[::5] = True  # so that values are learnt there, too
-        chosen = np.random.permutation(np.flatnonzero(counts))
-        size = batch_size or len(chosen)
-        for start in range(0, len(chosen), size):
-            yield self._get_samples(chosen[start : start + size])

@@ -86,7 +86,7 @@ def _judge(env: ResidualVecEnv, networks: list[Network], seeds: list[int]) -> tu
     law, recipe = networks[0], env.residual.recipe
     every = Network(law.mean, law.variance, ((weights, law.layers[0][1]),))  # a law of its own for each environment
     env.seed(seeds * len(networks))
-    features = env.reset()
+    features: Any = env.reset()
     going = np.ones(env.num_envs, np.bool_)
     returns, count = np.zeros(env.num_envs), 0
     while going.any():

@@ -52,8 +52,8 @@ class ResidualVecEnv(VecEnv):
         self.reset_infos = [{"disturbances": drawn} for drawn in info["disturbances"]]
         self._reset_seeds()
         self._reset_options()
-        self._memory = self.residual.start(self._observation)
-        return self._features()
+        features, self._memory = self._seen(self._observation, self.residual.start(self._observation))
+        return features
 
     def seed(self, seed: int | Sequence[int] | None = None) -> list[int | None]:
         """Seeds of the next reset: one for each environment, or a number from which on they count."""
@@ -82,18 +82,18 @@ class ResidualVecEnv(VecEnv):
                 terminated, truncated = terminated & ~done, truncated & ~done
             observation, memory = seen, after
             fell, done = fell | terminated, done | terminated | truncated
-        self._observation, self._memory = observation, memory
-        features = self._features()
+        features, memory = self._seen(observation, memory)
         coupling = self.residual.coupling
-        terms = coupling.reward_terms(observation, self._memory.coupling, fell)
+        terms = coupling.reward_terms(observation, memory.coupling, fell)
         rewards = total(coupling.reward_scales, terms).astype(np.float32)
         infos = list(self._infos)
         if done.any():
             for i in np.flatnonzero(done).tolist():
                 infos[i] = {"terminal_observation": features[i], "TimeLimit.truncated": not fell[i]}
-            self._observation, _ = self.env.reset(options={"reset_mask": done})
-            self._memory = choose(done, self.residual.start(self._observation), self._memory)
-            features = np.where(done[:, None], self._features(), features)
+            observation, _ = self.env.reset(options={"reset_mask": done})
+            begun, fresh = self._seen(observation, self.residual.start(observation))
+            features, memory = choose(done, (begun, fresh), (features, memory))
+        self._observation, self._memory = observation, memory
         return features, rewards, done, infos
 
     def close(self) -> None:
@@ -115,10 +115,9 @@ class ResidualVecEnv(VecEnv):
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
         return [None] * self.num_envs
 
-    def _features(self) -> Float:
-        assert self._memory is not None
-        features, self._memory = self.residual.observe(self._observation, self._memory)
-        return features.astype(np.float32, order="C")
+    def _seen(self, observation: Array, memory: ResidualMemory) -> tuple[Float, ResidualMemory]:
+        features, memory = self.residual.observe(observation, memory)
+        return features.astype(np.float32, order="C"), memory
 
 
 def batched(env_id: str, recipe: Recipe, count: int, kwargs: Mapping[str, Any]) -> ResidualVecEnv:
