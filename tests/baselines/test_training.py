@@ -24,6 +24,7 @@ from baselines.errors import TrainingError
 from baselines.export import exported
 from baselines.recipe import Recipe
 from baselines.residual_env import ResidualEnv
+from baselines.rollouts import OpenRollouts
 from baselines.run import Run, Training
 from baselines.train import Trainer, environments, train
 from baselines.vec_env import ResidualVecEnv, batched
@@ -241,6 +242,23 @@ def test_the_adapter_says_what_it_cannot_do():
     with pytest.raises(OptionError, match=r"hold is 0\.02"):
         ResidualVecEnv(batch(2, duration=1.0), Recipe("q450", hold=0.02))
     env.close()
+
+
+def test_decisions_under_a_shut_gate_are_mostly_left_out_of_rollouts():
+    steps, count = 10, 4
+    box = gym.spaces.Box(-np.inf, np.inf, (2,), np.float32)
+    rollouts = OpenRollouts(steps, box, gym.spaces.Box(-1.0, 1.0, (1,)), n_envs=count, gate=lambda seen: seen[:, 1])
+    rng = np.random.default_rng(0)
+    gates = np.where(rng.random((steps, count)) < 0.5, 0.0, 0.8)
+    for k, row in enumerate(gates):
+        seen = np.stack([count * k + np.arange(count), row], axis=1)
+        value = torch.zeros(count)
+        rollouts.add(seen, np.zeros((count, 1)), np.zeros(count), np.zeros(count), value, value)
+    for _ in range(2):  # epochs
+        got = np.concatenate([batch.observations.numpy() for batch in rollouts.get(7)])
+        assert len(set(got[:, 0])) == len(got)
+        assert set(got[got[:, 1] > 0, 0]) == set(np.flatnonzero(gates.ravel()))
+        assert 0 < (got[:, 1] == 0).sum() <= steps * count / 5
 
 
 def returns(actor: Any, recipe: Recipe, count: int = 64) -> np.ndarray:
