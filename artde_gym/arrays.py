@@ -12,7 +12,7 @@ Array: TypeAlias = NDArray[np.floating[Any]]
 
 
 def each(function: Callable[..., float]) -> Callable[..., Array]:
-    """A function of numbers as one of arrays (n,): what `math` says of each, where NumPy's own would round otherwise."""
+    """A function of numbers as one of arrays (n,): for those of `math`, since NumPy's own round otherwise."""
 
     def mapped(*arrays: Array) -> Array:
         return np.fromiter(map(function, *(array.tolist() for array in arrays)), np.float64, len(arrays[0]))

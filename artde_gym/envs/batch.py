@@ -1,4 +1,4 @@
-"""What the environments of many robots share: Gymnasium's conventions of vectors, seeds, masks, and ends of episodes."""
+"""What environments of many robots share: Gymnasium's conventions of vectors, seeds, masks, and ends of episodes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
-from numpy.typing import ArrayLike, DTypeLike, NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
@@ -55,7 +55,9 @@ class BatchEnv(VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
     _np_random: Any  # a list: one for each environment, as for the seeds
     _np_random_seed: Any
 
-    def __init__(self, num_envs: int, dtype: DTypeLike = np.float64, *, autoreset: bool = True) -> None:
+    def __init__(
+        self, num_envs: int, dtype: Literal["float64", "float32"] = "float64", *, autoreset: bool = True
+    ) -> None:
         if isinstance(num_envs, bool) or not (isinstance(num_envs, int) and num_envs >= 1):
             raise OptionError("num_envs", num_envs, "a whole number >= 1")
         self.num_envs = num_envs

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from artde_gym.arrays import Array, each
 from artde_gym.disturbances import Disturbances
@@ -142,8 +143,8 @@ class BipedVectorEnv(BatchEnv):
         for i in drawn:
             self._course(i).settled(self._tau[i].copy())
 
-    def _settle(self, some: Any, poses: Array, steps: int) -> Array:
-        """Let some robots stand still in `poses` (n, 12) (rad) for so many time steps; returns the torques in the end."""
+    def _settle(self, some: NDArray[np.int32], poses: Array, steps: int) -> Array:
+        """Let some robots stand still in `poses` (n, 12) (rad) for so many time steps; returns their last torques."""
         tau = np.zeros_like(poses)
         for _ in range(steps):
             tau = self._walk.hold(poses, *self._batch.joints(some))
@@ -192,12 +193,13 @@ class BipedVectorEnv(BatchEnv):
         state = self._state = self._batch.read()
         with np.errstate(invalid="ignore", over="ignore"):  # of a robot that has diverged
             self._tilt = roll_pitch(state.quat_xyzw, _ARCTANGENT, _ARCSINE)
-        out = np.empty(self.observation_space.shape)
+        out = np.empty((self.num_envs, self.observation_layout.size))
         out[:, COLUMNS["q"]], out[:, COLUMNS["qd"]] = state.q, state.qd
         plan = self._walk.plan[self._k]
         out[:, PLAN], out[:, CLOCK] = plan[:, :-2], plan[:, -2:]
         out[:, COLUMNS["tau_applied"]] = self._tau
-        out[:, BASE] = np.concatenate([state.position[2:], self._tilt, state.velocity, state.angular_velocity]).T
+        base = (state.position[2], *self._tilt, *state.velocity, *state.angular_velocity)
+        out[:, BASE] = np.stack(base, axis=1)
         out[:, COLUMNS["contact"]] = self._batch.foot_loads() > LOADED
         if self.observe_ground_force:
             out[:, CLOCK.stop :] = self._batch.ground_forces()
@@ -217,7 +219,7 @@ class BipedVectorEnv(BatchEnv):
             change = tau - self._previous
             squares = _square(error), roll * roll + pitch * pitch, _square(tau), _square(change)
             terms = task.reward_terms(*squares, _EXP)
-            return terms, task.falls(tuple(state.quat_xyzw), state.position[2], _square(state.qd))
+            return terms, task.falls(state.quat_xyzw, state.position[2], _square(state.qd))
 
     def _tell(self) -> dict[str, Array]:
         return {"foot_loads": self._batch.foot_loads().copy()}

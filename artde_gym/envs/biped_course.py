@@ -37,9 +37,7 @@ class Course:
         joints = walk.nominal_robot.actuated
         self._actuation = None if kinds.isdisjoint(Actuation.KINDS) else Actuation(realised, joints, TIME_STEP)
         self.sensing = (
-            None
-            if kinds.isdisjoint(Sensing.KINDS)
-            else Sensing(realised, OBSERVATION, walk.control_period, rng)
+            None if kinds.isdisjoint(Sensing.KINDS) else Sensing(realised, OBSERVATION, walk.control_period, rng)
         )
         self._target = self._total = np.zeros(len(joints))
         self._substeps = walk.substeps

@@ -139,7 +139,7 @@ walk.
 | `step_duration` | 1.0 | 0.6 to 2 s | time of one step |
 | `duration` | 58.0 | from 0.1 s | length of the walk |
 | `observe_ground_force` | False | False, True | append the ground's force on each foot to the observation |"""
-"""What the pages of all environments share, with `{observation}` and `{default}` filled in; their own arguments follow."""
+"""What all pages share, with `{observation}` and `{default}` to be filled in; arguments of their own follow."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -304,7 +304,7 @@ def _part(first: int, stop: int, start: int) -> slice:
 
 
 def _added(before: Array, values: Array | Mask, live: Mask | None) -> Array:
-    """A sum (n, ...) with a block's samples (samples, n, ...) added one by one, so that no bit depends on the blocks."""
+    """A sum (n, ...) with a block's samples (samples, n, ...) added one by one: no bit depends on the blocks."""
     start = np.broadcast_to(before, values.shape[1:])
     total = np.add.accumulate(np.concatenate([start[None], values]), axis=0)[-1]
     return total if live is None else np.where(_beside(live, total), total, start)

@@ -25,14 +25,14 @@ Ids = NDArray[np.int32]
 
 
 class States(NamedTuple):
-    """Robots at one instant, as in `artde_gym.sim.engine.State`: `q` and `qd` (n, joints), the others (3 or 4, n)."""
+    """Robots at one instant, as in `artde_gym.sim.engine.State`; `q` and `qd` are (n, joints), each component (n,)."""
 
     q: Array
     qd: Array
-    position: Array
-    quat_xyzw: Array
-    velocity: Array
-    angular_velocity: Array
+    position: tuple[Array, Array, Array]
+    quat_xyzw: tuple[Array, Array, Array, Array]
+    velocity: tuple[Array, Array, Array]
+    angular_velocity: tuple[Array, Array, Array]
 
 
 class MujocoBatch:
@@ -90,11 +90,10 @@ class MujocoBatch:
 
     def read(self) -> States:
         """The states now; views, where possible, of what the next step changes."""
-        pose, twist = self._pose.T, self._twist.T
-        quat = pose[[4, 5, 6, 3]]
-        x, y, z = rotated(twist[3:6], quat)
-        q, qd = self.joints()
-        return States(q, qd, pose[:3], quat, twist[:3], np.stack([x, y, z]))
+        x, y, z, w, i, j, k = self._pose[:, :7].T
+        vx, vy, vz, wx, wy, wz = self._twist[:, :6].T
+        quat = (i, j, k, w)
+        return States(*self.joints(), (x, y, z), quat, (vx, vy, vz), rotated((wx, wy, wz), quat))
 
     def joints(self, worlds: Ids | slice = slice(None)) -> tuple[Array, Array]:
         """q and qd (n, joints) of some worlds; of all of them views."""

@@ -77,6 +77,33 @@ def test_crashes_are_those_of_single() -> None:
     np.testing.assert_allclose(batch["rmse_m_x"], single["rmse_m_x"], atol=2e-3)
 
 
+def test_bipeds_in_batches_are_single_ones_to_the_bit(tmp_path: Path) -> None:
+    """Metrics and signals of walks that fall and of walks that do not; in the same engine nothing may differ."""
+    ahead = {"magnitude": {"uniform": [1.0, 250.0]}, "start": 0.1, "duration": 0.1}
+    mild: dict[str, Any] = {"payload": {"mass": {"uniform": [0.5, 1.5]}}, "push": [ahead], "mass_error": 1.02}
+    for backend in ("single", "batch"):
+        evaluate(
+            ["tde", "artde"],
+            "BipedPush-v0",
+            episodes=5,
+            disturbances=mild,
+            env_kwargs={"engine": "mujoco", "duration": 1.2, "control_period": 0.002},
+            out=tmp_path / backend,
+            traced=2,
+            backend=backend,  # pyright: ignore[reportArgumentType]
+        )
+    single, batch = tmp_path / "single", tmp_path / "batch"
+    assert (single / "episodes.csv").read_bytes() == (batch / "episodes.csv").read_bytes()
+    fell = pd.read_csv(single / "episodes.csv")["fell"]
+    assert 0 < fell.sum() < len(fell)
+    assert len(list(single.glob("traces/*/*.npz"))) == 4
+    for path in single.glob("traces/*/*.npz"):
+        one, other = np.load(path), np.load(batch / path.relative_to(single))
+        assert set(one) == set(other)
+        for name in one:
+            assert np.array_equal(one[name], other[name]), name
+
+
 @pytest.mark.parametrize(
     ("disturbances", "ways"), [(WINDY, [(1, 1), (4, 2)]), (FAILING, [(1, 1), (3, 1)])], ids=["windy", "failing"]
 )
