@@ -2,9 +2,10 @@
 
 While the right leg carries the robot, observation and action go through a mirror, so that one network serves both.
 
-Channel "synergies": the action moves, within `RANGES`, the swinging foot, the body over both feet, the ankles and the
-lean. Through the inverse kinematics of the legs this is an offset r of the reference joints, which a critically damped
-filter of `FILTER_RATE` turns into a smooth one; an offset of the reference is an acceleration in the slot of du,
+Channels "synergies" and "wide-synergies": the action moves, within `RANGES`, the swinging foot, the body over both
+feet, the ankles and the lean. Through the inverse kinematics of the legs this is an offset r of the reference joints,
+which a critically damped filter of `FILTER_RATE` turns into a smooth one; an offset of the reference is an acceleration
+in the slot of du,
 
     du = r.. + Kd r. + Kp r,    r.. = (r._k+1 - r._k) / L
 
@@ -30,20 +31,20 @@ from controllers.laws.second_order import FilterMemory, second_order
 from controllers.laws.tracking import Array, sliding_variable
 from controllers.policies import Plant
 
-RANGES: dict[str, float] = {
-    "swing_x": 0.10,  # m, of the swinging foot, forward
-    "swing_out": 0.06,  # m, away from the standing leg
-    "swing_z": 0.03,  # m, up
-    "body_x": 0.04,  # m, of the body over both feet, forward
-    "body_y": 0.03,  # m, to the left
-    "stance_pitch": 0.2,  # rad, of the standing leg's ankle
-    "stance_roll": 0.15,  # rad
-    "swing_pitch": 0.15,  # rad, of the swinging leg's ankle
-    "swing_roll": 0.15,  # rad
-    "lean_pitch": 0.15,  # rad, of both hips
-    "lean_roll": 0.1,  # rad
+RANGES: dict[str, dict[str, float]] = {
+    "swing_x": {"synergies": 0.10, "wide-synergies": 0.15},  # m, of the swinging foot, forward
+    "swing_out": {"synergies": 0.06, "wide-synergies": 0.10},  # m, away from the standing leg
+    "swing_z": {"synergies": 0.03, "wide-synergies": 0.03},  # m, up
+    "body_x": {"synergies": 0.04, "wide-synergies": 0.06},  # m, of the body over both feet, forward
+    "body_y": {"synergies": 0.03, "wide-synergies": 0.06},  # m, to the left
+    "stance_pitch": {"synergies": 0.2, "wide-synergies": 0.2},  # rad, of the standing leg's ankle
+    "stance_roll": {"synergies": 0.15, "wide-synergies": 0.2},  # rad
+    "swing_pitch": {"synergies": 0.15, "wide-synergies": 0.15},  # rad, of the swinging leg's ankle
+    "swing_roll": {"synergies": 0.15, "wide-synergies": 0.15},  # rad
+    "lean_pitch": {"synergies": 0.15, "wide-synergies": 0.4},  # rad, of both hips
+    "lean_roll": {"synergies": 0.1, "wide-synergies": 0.3},  # rad
 }
-"""What a component of the action is, in the mirror, and its largest size."""
+"""What a component of the action is, in the mirror, and its largest size by channel."""
 FILTER_RATE = 25.0  # rad/s
 K_P, K_D = 25.0, 10.0  # of the error dynamics that the thesis asks for
 OPENS_TILT = (0.03, 0.08)  # rad, where the gate begins to open, and where it is open; a walk without pushes: 0.016
@@ -98,7 +99,8 @@ class OjasCoupling:
 
     def __init__(self, plant: Plant, recipe: Recipe, gains: Any) -> None:
         torque = recipe.base == NO_BASE
-        self._synergies = recipe.channel == "synergies" and not torque
+        self._synergies = recipe.channel != "joints" and not torque
+        self._sizes = np.array([sizes[recipe.channel] for sizes in RANGES.values()]) if self._synergies else np.ones(1)
         self._limit = float(plant.action.box().high[0]) if torque else recipe.limit
         self._gated = recipe.gated and not torque
         self._period = plant.control_period
@@ -204,7 +206,7 @@ class OjasCoupling:
         if not self._synergies:
             target = self._limit * scaled
             return memory._replace(action=action, target=_unmirrored(memory.right, target))
-        wanted = scaled * _SIZES
+        wanted = scaled * self._sizes
         offsets = memory.offsets
         in_air = np.stack([wanted[..., 0], -wanted[..., 1]], axis=-1)
         flying = np.where(memory.single[..., None], in_air, offsets[..., 2:])
@@ -251,7 +253,6 @@ class OjasCoupling:
         return np.maximum(np.maximum(by_tilt, by_speed), kept).astype(before.dtype, copy=False)
 
 
-_SIZES = np.array(list(RANGES.values()))
 _SINGLE = 1.0 - 1e-6
 _CLOSED = 0.01
 

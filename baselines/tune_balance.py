@@ -35,7 +35,7 @@ def tune(training: Training, out: str | Path, on_progress: Callable[[Progress], 
     Raises:
         TrainingError: if `out` holds a run of another configuration, the robot has no such law, or the engine no batch.
     """
-    if training.recipe.robot != "ojas" or training.recipe.channel != "synergies":
+    if training.recipe.robot != "ojas" or training.recipe.channel == "joints":
         raise TrainingError("recipe", training.recipe, "the biped's synergies, of which the law has gains")
     run = Run(training, Path(out), on_progress)
     if not run.batched:

@@ -137,7 +137,7 @@ def walking_observation(rng, load_left: float) -> np.ndarray:
     return observation
 
 
-@pytest.mark.parametrize("channel", ["synergies", "joints"])
+@pytest.mark.parametrize("channel", ["synergies", "wide-synergies", "joints"])
 def test_the_mirrored_robot_gets_the_mirrored_residual(channel):
     rng = np.random.default_rng(2)
     env = make("BipedWalk-Payload-v0")
