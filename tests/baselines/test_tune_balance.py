@@ -36,7 +36,6 @@ def test_the_law_is_linear_in_the_state_of_its_plane(residual):
         expected = dict(zip(sagittal, gains.reshape(-1, 4)[:4, column], strict=True))
         for name, action in found.items():
             assert action == pytest.approx(expected.get(name, 0.0), abs=1e-6)
-    assert set(sagittal) == {name for name, action in found.items() if action}
 
 
 @pytest.fixture
