@@ -163,7 +163,7 @@ def register_laws() -> None:
         text="TDE + a residual that reinforcement learning (PPO) has trained, one for each environment",
         policies={
             "BipedPush-v0": "biped-push",
-            "BipedWalk-Payload-v0": "biped-push",
+            "BipedWalk-Payload-v0": "biped-walk",
             "QuadInfinity-Payload-v0": "quadrotor-gale",
         },
     )
