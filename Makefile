@@ -44,6 +44,6 @@ clean:  ## remove the environment and all caches, keep runs
 	@touch $@
 
 .venv/dev: .venv/core
-	@echo "artde-gym: installing the extras dev, mujoco and rl into .venv"
-	@$(INSTALL) --editable '.[dev,mujoco,rl]'
+	@echo "artde-gym: installing the extras dev, mujoco, rl and video into .venv"
+	@$(INSTALL) --editable '.[dev,mujoco,rl,video]'
 	@touch $@
