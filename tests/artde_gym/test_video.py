@@ -28,14 +28,8 @@ from artde_gym.registration import registered_controllers
 
 WALK = "BipedWalk-Payload-v0"
 SHOVE = {"body": "chest", "magnitude": 80.0, "direction": [1.0, 0.0, 0.0], "start": 0.2, "duration": 0.2}
-FALL: dict[str, Any] = {"disturbances": {"push": [SHOVE]}, "env_kwargs": {"engine": "mujoco", "duration": 3.0}}
-FLIGHT: dict[str, Any] = {"env_kwargs": {"engine": "mujoco", "duration": 2.0}, "disturbances": {"payload": 0.35}}
-
-
-@pytest.fixture(autouse=True)
-def _draws(drawing_engine: str) -> None:
-    if drawing_engine == "bullet":
-        pytest.skip("once is enough")
+FALL: dict[str, Any] = {"disturbances": {"push": [SHOVE]}, "env_kwargs": {"duration": 3.0, "control_period": 0.004}}
+FLIGHT: dict[str, Any] = {"env_kwargs": {"duration": 2.0}, "disturbances": {"payload": 0.35}}
 
 
 def frames(path: Path) -> list[np.ndarray]:
@@ -66,8 +60,8 @@ def test_shots_are_of_the_episode_that_evaluate_runs() -> None:
     row = evaluate(["tde"], WALK, episodes=1, seed=5, **FALL).episodes.iloc[0]
     kwargs = {**FALL["env_kwargs"], "disturbances": FALL["disturbances"]}
     spec = registered_controllers()["tde"]
-    seen = list(shots(WALK, kwargs, spec, {}, int(row["seed"]), [0.0, 0.1, 0.2505, 9.0, 10.0], 64))
-    assert [shot.time_s for shot in seen] == pytest.approx([0.0, 0.1, 0.251, row["time_to_fall_s"]])
+    seen = list(shots(WALK, kwargs, spec, {}, int(row["seed"]), [0.0, 0.1, 0.25, 9.0, 10.0], 64))
+    assert [shot.time_s for shot in seen] == pytest.approx([0.0, 0.1, 0.252, row["time_to_fall_s"]])
     assert [shot.over for shot in seen] == [False, False, False, True]
     assert seen[-1].fall_reason == row["fall_reason"]
     assert all(shot.picture.shape == (48, 64, 3) for shot in seen)
@@ -83,7 +77,7 @@ def test_two_controllers_side_by_side_with_their_fall(tmp_path: Path, suffix: st
     assert height % 2 == 0
     for number, name in enumerate(("tde", "artde")):
         part = np.s_[20:42, number * 164 : number * 164 + 80]
-        assert near(first[part], LOOKS[name].colour).sum() > 10
+        assert near(first[part], LOOKS[name].colour, 60).sum() > 10
         panel = np.s_[45:, number * 164 : number * 164 + 160]
         assert near(last[panel], FALLEN).sum() > 300  # its frame
         assert not near(first[panel], FALLEN).sum() > 10
@@ -166,7 +160,7 @@ def test_without_ffmpeg_one_clear_line(monkeypatch: pytest.MonkeyPatch, tmp_path
 
 def test_command(tmp_path: Path) -> None:
     out = tmp_path / "x.webp"
-    line = f"video --env QuadInfinity-Payload-v0 --controllers tde,pid --engine mujoco --end 0.3 --fps 10 --width 96 --out {out}"
+    line = f"video --env QuadInfinity-Payload-v0 --controllers tde,pid --end 0.3 --fps 10 --width 96 --out {out}"
     answer = CliRunner().invoke(app, line.split())
     assert answer.exit_code == 0, answer.output
     assert len(frames(out)) == 3
