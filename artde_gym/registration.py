@@ -80,7 +80,7 @@ def make_controller(name: str, env: Any, **overrides: Any) -> Any:
         UnknownNameError: if no controller has this name.
     """
     known = _known(name)
-    return _resolved(known.entry_point)(env, **{**known.kwargs, **overrides})
+    return resolved(known.entry_point)(env, **{**known.kwargs, **overrides})
 
 
 def search_space(name: str, env: Any) -> dict[str, GainRange]:
@@ -93,7 +93,7 @@ def search_space(name: str, env: Any) -> dict[str, GainRange]:
     if known.search is None:
         tunable = [other for other, spec in _controllers.items() if spec.search is not None]
         raise UnknownNameError("controller to be tuned", name, among(name, tunable))
-    return dict(_resolved(known.search)(env, **known.kwargs))
+    return dict(resolved(known.search)(env, **known.kwargs))
 
 
 def _known(name: str) -> ControllerSpec:
@@ -102,7 +102,8 @@ def _known(name: str) -> ControllerSpec:
     return _controllers[name]
 
 
-def _resolved(entry_point: str) -> Callable[..., Any]:
+def resolved(entry_point: str) -> Callable[..., Any]:
+    """The function that an entry point "module:function" names."""
     module, function = entry_point.split(":")
     return getattr(importlib.import_module(module), function)
 
@@ -151,8 +152,18 @@ def register_laws() -> None:
         search="controllers.model_based:search_space",
     )
     register_controller(
+        "tde+balance",
+        "baselines.saved:make_shipped",
+        text="biped: TDE + a linear balance law of 28 gains that CMA-ES has tuned under pushes",
+        policies=dict.fromkeys(("BipedPush-v0", "BipedWalk-Payload-v0"), "biped-balance"),
+    )
+    register_controller(
         "tde+ppo",
         "baselines.saved:make_shipped",
-        text="quadrotor: TDE + a residual that reinforcement learning (PPO) has trained in a gale",
-        policies={"q450": "quadrotor-gale"},
+        text="TDE + a residual that reinforcement learning (PPO) has trained, one for each environment",
+        policies={
+            "BipedPush-v0": "biped-push",
+            "BipedWalk-Payload-v0": "biped-walk",
+            "QuadInfinity-Payload-v0": "quadrotor-gale",
+        },
     )

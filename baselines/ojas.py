@@ -2,9 +2,10 @@
 
 While the right leg carries the robot, observation and action go through a mirror, so that one network serves both.
 
-Channel "synergies": the action moves, within `RANGES`, the swinging foot, the body over both feet, the ankles and the
-lean. Through the inverse kinematics of the legs this is an offset r of the reference joints, which a critically damped
-filter of `FILTER_RATE` turns into a smooth one; an offset of the reference is an acceleration in the slot of du,
+Channels "synergies" and "wide-synergies": the action moves, within `RANGES`, the swinging foot, the body over both
+feet, the ankles and the lean. Through the inverse kinematics of the legs this is an offset r of the reference joints,
+which a critically damped filter of `FILTER_RATE` turns into a smooth one; an offset of the reference is an acceleration
+in the slot of du,
 
     du = r.. + Kd r. + Kp r,    r.. = (r._k+1 - r._k) / L
 
@@ -30,20 +31,20 @@ from controllers.laws.second_order import FilterMemory, second_order
 from controllers.laws.tracking import Array, sliding_variable
 from controllers.policies import Plant
 
-RANGES: dict[str, float] = {
-    "swing_x": 0.10,  # m, of the swinging foot, forward
-    "swing_out": 0.06,  # m, away from the standing leg
-    "swing_z": 0.03,  # m, up
-    "body_x": 0.04,  # m, of the body over both feet, forward
-    "body_y": 0.03,  # m, to the left
-    "stance_pitch": 0.2,  # rad, of the standing leg's ankle
-    "stance_roll": 0.15,  # rad
-    "swing_pitch": 0.15,  # rad, of the swinging leg's ankle
-    "swing_roll": 0.15,  # rad
-    "lean_pitch": 0.15,  # rad, of both hips
-    "lean_roll": 0.1,  # rad
+RANGES: dict[str, dict[str, float]] = {
+    "swing_x": {"synergies": 0.10, "wide-synergies": 0.15},  # m, of the swinging foot, forward
+    "swing_out": {"synergies": 0.06, "wide-synergies": 0.10},  # m, away from the standing leg
+    "swing_z": {"synergies": 0.03, "wide-synergies": 0.03},  # m, up
+    "body_x": {"synergies": 0.04, "wide-synergies": 0.06},  # m, of the body over both feet, forward
+    "body_y": {"synergies": 0.03, "wide-synergies": 0.06},  # m, to the left
+    "stance_pitch": {"synergies": 0.2, "wide-synergies": 0.2},  # rad, of the standing leg's ankle
+    "stance_roll": {"synergies": 0.15, "wide-synergies": 0.2},  # rad
+    "swing_pitch": {"synergies": 0.15, "wide-synergies": 0.15},  # rad, of the swinging leg's ankle
+    "swing_roll": {"synergies": 0.15, "wide-synergies": 0.15},  # rad
+    "lean_pitch": {"synergies": 0.15, "wide-synergies": 0.4},  # rad, of both hips
+    "lean_roll": {"synergies": 0.1, "wide-synergies": 0.3},  # rad
 }
-"""What a component of the action is, in the mirror, and its largest size."""
+"""What a component of the action is, in the mirror, and its largest size by channel."""
 FILTER_RATE = 25.0  # rad/s
 K_P, K_D = 25.0, 10.0  # of the error dynamics that the thesis asks for
 OPENS_TILT = (0.03, 0.08)  # rad, where the gate begins to open, and where it is open; a walk without pushes: 0.016
@@ -59,6 +60,7 @@ class OjasMemory(NamedTuple):
         right: whether the right leg carries (...).
         single: whether one leg alone is planned to (...).
         gate: (...).
+        drift: squared horizontal velocity error (...) (m^2/s^2).
         ankles: of the reference, standing and swinging leg, in the mirror (..., 2, 3) (m).
         offsets: of feet on the ground or in the air: standing x, y, swinging x, y, in the mirror (..., 4) (m).
         action: in the mirror (..., n).
@@ -69,6 +71,7 @@ class OjasMemory(NamedTuple):
     right: NDArray[np.bool_]
     single: NDArray[np.bool_]
     gate: Array
+    drift: Array
     ankles: Array
     offsets: Array
     action: Array
@@ -96,7 +99,8 @@ class OjasCoupling:
 
     def __init__(self, plant: Plant, recipe: Recipe, gains: Any) -> None:
         torque = recipe.base == NO_BASE
-        self._synergies = recipe.channel == "synergies" and not torque
+        self._synergies = recipe.channel != "joints" and not torque
+        self._sizes = np.array([sizes[recipe.channel] for sizes in RANGES.values()]) if self._synergies else np.ones(1)
         self._limit = float(plant.action.box().high[0]) if torque else recipe.limit
         self._gated = recipe.gated and not torque
         self._period = plant.control_period
@@ -132,6 +136,7 @@ class OjasCoupling:
             no,
             no,
             np.zeros(lead, kind),
+            np.zeros(lead, kind),
             np.zeros((*lead, 2, 3), kind),
             np.zeros((*lead, 4), kind),
             np.zeros((*lead, len(self.actions)), kind),
@@ -153,7 +158,9 @@ class OjasCoupling:
         velocity_ref = (ankles[..., 4, :] - ankles[..., 3, :]) / (2 * DIFFERENCE)
         velocity_error = seen[..., at["base_velocity"]] - velocity_ref
         displacement = ankles[..., 0, :] - level(tilt, ankles[..., 2, :])
-        gate = self._gate(tilt, velocity_error, memory.gate)
+        sideways = velocity_error[..., :2]
+        drift = np.vecdot(sideways, sideways)
+        gate = self._gate(tilt, drift, memory.gate)
         load = seen[..., at["load_left_ref"]]
         changed = right != memory.right
         offsets, action = memory.offsets, memory.action
@@ -184,7 +191,12 @@ class OjasCoupling:
             action,
         ]
         kept = memory._replace(
-            right=right, single=load[..., 0] > _SINGLE, gate=gate, ankles=ankles[..., :2, :], offsets=offsets
+            right=right,
+            single=load[..., 0] > _SINGLE,
+            gate=gate,
+            drift=drift,
+            ankles=ankles[..., :2, :],
+            offsets=offsets,
         )
         return np.concatenate(parts, axis=-1, dtype=observation.dtype), kept
 
@@ -194,7 +206,7 @@ class OjasCoupling:
         if not self._synergies:
             target = self._limit * scaled
             return memory._replace(action=action, target=_unmirrored(memory.right, target))
-        wanted = scaled * _SIZES
+        wanted = scaled * self._sizes
         offsets = memory.offsets
         in_air = np.stack([wanted[..., 0], -wanted[..., 1]], axis=-1)
         flying = np.where(memory.single[..., None], in_air, offsets[..., 2:])
@@ -220,30 +232,27 @@ class OjasCoupling:
 
     def reward_terms(self, observation: Array, memory: OjasMemory, fell: Any) -> dict[str, Array]:
         at, action = self._at, memory.action
-        tilt, velocity = observation[..., at["tilt"]], observation[..., at["base_velocity"]]
+        tilt = observation[..., at["tilt"]]
         e = observation[..., at["q_ref"]] - observation[..., at["q"]]
-        too_fast = velocity[..., :2] - np.array([0.1, 0.0])
         return {
             "alive": np.ones(observation.shape[:-1]),
             "upright": np.exp(-np.vecdot(tilt, tilt) / 0.02),
-            "velocity": np.exp(-np.vecdot(too_fast, too_fast) / 0.1),
+            "velocity": np.exp(-memory.drift / 0.1),
             "tracking": np.exp(-np.vecdot(e, e) / 0.02),
-            "residual": np.vecdot(action, action),
+            "residual": memory.gate * np.vecdot(action, action),
             "fall": np.asarray(fell, dtype=np.float64),
         }
 
-    def _gate(self, tilt: Array, velocity_error: Array, before: Array) -> Array:
+    def _gate(self, tilt: Array, drift: Array, before: Array) -> Array:
         if not self._gated:
             return np.ones_like(before)
-        sideways = velocity_error[..., :2]
         by_tilt = _smooth(np.sqrt(np.vecdot(tilt, tilt)), *OPENS_TILT)
-        by_speed = _smooth(np.sqrt(np.vecdot(sideways, sideways)), *OPENS_SPEED)
+        by_speed = _smooth(np.sqrt(drift), *OPENS_SPEED)
         kept = before * np.exp(-self._hold / CLOSING)
         kept = np.where(kept > _CLOSED, kept, 0.0)
         return np.maximum(np.maximum(by_tilt, by_speed), kept).astype(before.dtype, copy=False)
 
 
-_SIZES = np.array(list(RANGES.values()))
 _SINGLE = 1.0 - 1e-6
 _CLOSED = 0.01
 

@@ -11,7 +11,7 @@ from artde_gym.errors import OptionError, among
 
 HOLDS = {"ojas": 0.02, "q450": 0.015}
 """Default time between two decisions (s), by robot."""
-CHANNELS = {"ojas": ("synergies", "joints"), "q450": ("attitude", "position", "cascade")}
+CHANNELS = {"ojas": ("synergies", "wide-synergies", "joints"), "q450": ("attitude", "position", "cascade")}
 """What an action may mean, by robot; the first one is the default."""
 NO_BASE = "none"
 
@@ -24,8 +24,8 @@ class Recipe:
         robot: by the environment's `robot_name`.
         base: registered name of the base controller; "none", and the action is the force itself.
         gains: in place of the base's preset's.
-        channel: "synergies" of the legs or raw "joints" (biped), the "attitude" loop, the "position" loop or both, the
-            "cascade" (quadrotor); see the robots' modules.
+        channel: "synergies" of the legs, "wide-synergies" or raw "joints" (biped), the "attitude" loop, the "position"
+            loop or both, the "cascade" (quadrotor); see the robots' modules.
         hold: time between two decisions (s), a whole number of control periods.
         limit: largest size of each component of du (rad/s^2, m/s^2); that of the attitude loop is `TURNING` times it.
         gated: whether the residual fades in by tilt and velocity error (biped), or is there all the time.
@@ -72,5 +72,5 @@ class Recipe:
         return periods
 
 
-LIMITS = {"synergies": 250.0, "joints": 25.0, "attitude": 0.5, "cascade": 0.5, "position": 0.5}
+LIMITS = {"synergies": 250.0, "wide-synergies": 250.0, "joints": 25.0, "attitude": 0.5, "cascade": 0.5, "position": 0.5}
 """Default limit of du, by channel (rad/s^2, m/s^2). Synergies are bounded by their ranges long before."""

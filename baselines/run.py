@@ -43,8 +43,8 @@ class Training:
         seed: of everything.
         env_kwargs: arguments of the environment on top of the task's.
         options: arguments of the algorithm on top of the task's.
-        envs: number of environments; None for the task's, or the number of workers.
-        workers: processes of environments; the batched quadrotor takes one.
+        envs: number of environments; None for the task's in a batch, or the number of workers.
+        workers: processes of environments that are no batch.
         test_every: intervals between two held-out tests.
         patience: tests without a better score after which the training ends.
         level: difficulty at the start; None for the task's.
@@ -109,6 +109,12 @@ class Run:
         _claim(folder, json.loads(json.dumps(dataclasses.asdict(training))))
 
     @property
+    def batched(self) -> bool:
+        """Whether all environments are one batch: quadrotors always, bipeds in MuJoCo."""
+        engine = self.task.batch_engine
+        return engine is None or environment_kwargs(self.training).get("engine") == engine
+
+    @property
     def exported(self) -> Path:
         """Folder of the best policy so far."""
         return self.folder / EXPORT
@@ -150,7 +156,7 @@ class Run:
             episodes=self.task.episodes,
             seed=HELD_OUT,
             workers=training.workers,
-            backend="batch" if self.task.batched else "single",
+            backend="batch" if self.batched else "single",
         ).episodes
         score = self.task.score(rows)
         means = {name: float(np.mean(rows[name].to_numpy())) for name in _SHOWN if name in rows}

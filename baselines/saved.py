@@ -44,15 +44,16 @@ def make_shipped(env: Any, *, policies: dict[str, str]) -> ResidualPolicy:
 
     Args:
         env: the environment that it will drive.
-        policies: robot -> name of the policy.
+        policies: environment id -> name of the policy.
 
     Raises:
-        UnknownNameError: if there is none for the robot.
+        UnknownNameError: if there is none for the environment, or if Gymnasium did not make it and it has no id.
     """
-    robot = Plant.of(env).robot
-    if robot not in policies:
-        raise UnknownNameError("robot of a trained policy", robot, among(robot, policies))
-    return load(SHIPPED / policies[robot], env)
+    spec = env.get_attr("spec")[0] if hasattr(env, "num_envs") else env.unwrapped.spec
+    env_id = "" if spec is None else spec.id
+    if env_id not in policies:
+        raise UnknownNameError("environment of a trained policy", env_id, among(env_id, policies))
+    return load(SHIPPED / policies[env_id], env)
 
 
 class _Trained:

@@ -26,8 +26,9 @@ class Task:
         test: disturbances of the held-out episodes.
         episodes: of one held-out test.
         score: the better, the larger, from the rows of a test.
-        batched: whether all environments are one in NumPy.
-        envs: number of environments; None for one a process.
+        batch_engine: the engine of the environments of which a batch takes the place; None for any.
+        batch: arguments of the batch.
+        envs: number of environments in a batch.
         ppo, sac: arguments of the algorithms.
         rollouts: of PPO between two checkpoints.
         level: difficulty at the start.
@@ -39,8 +40,9 @@ class Task:
     test: Mapping[str, Any]
     episodes: int
     score: Callable[[pd.DataFrame], float]
-    batched: bool
-    envs: int | None
+    batch_engine: str | None
+    batch: Mapping[str, Any]
+    envs: int
     ppo: Mapping[str, Any]
     sac: Mapping[str, Any]
     rollouts: int
@@ -85,10 +87,13 @@ def push(magnitude: Any, direction: Any = None, start: Any = None, duration: Any
 
 
 def _pushed(level: float, payload: float, unpushed: int) -> dict[str, Any]:
-    """Pushes up to 10 N at first and 35 N in the end; `unpushed` of ten episodes are nominal ones."""
-    sizes = np.linspace(5.0, 10.0 + 25.0 * level, 10 - unpushed).round(2).tolist()
+    """Two pushes of up to 20 N at first and 35 N in the end; `unpushed` of ten of each are none at all."""
+    sizes = {"choice": [0.0] * unpushed + np.linspace(14.0, 20.0 + 15.0 * level, 10 - unpushed).round(2).tolist()}
     return {
-        "push": [push({"choice": [0.0] * unpushed + sizes}, duration=_uniform(0.15, 0.25))],
+        "push": [
+            push(sizes, start=_uniform(2.1, 4.1), duration=_uniform(0.15, 0.25)),
+            push(sizes, start=_uniform(4.6, 5.6), duration=_uniform(0.15, 0.25)),
+        ],
         "payload": {
             "mass": _uniform(0.001, payload),
             "position": [_uniform(-0.02, 0.02), _uniform(-0.02, 0.02), _uniform(0.14, 0.18)],
@@ -120,10 +125,10 @@ _FLIGHT_PPO = {
     "log_std_init": -2.3,  # of white noise on a loop that the thesis' gains damp little
 }
 _WALK_PPO = {
-    "n_steps": 1024,
-    "batch_size": 256,
+    "n_steps": 128,
+    "batch_size": 512,
     "n_epochs": 6,
-    "learning_rate": 5e-4,
+    "learning_rate": 3e-4,
     "gamma": 0.99,
     "log_std_init": -1.3,
 }
@@ -132,14 +137,15 @@ _SAC = {"batch_size": 256, "buffer_size": 200_000, "learning_rate": 3e-4, "learn
 _BIPED: dict[str, Any] = {
     "robot": "ojas",
     "kwargs": {"duration": 8.0, "self_collision": True},
-    "episodes": 24,
+    "episodes": 48,
     "score": _survival,
-    "batched": False,
-    "envs": None,
+    "batch_engine": "mujoco",
+    "batch": {"autoreset": False},
+    "envs": 64,
     "ppo": _WALK_PPO,
     "sac": {**_SAC, "gamma": 0.99},
     "rollouts": 8,
-    "level": 0.2,
+    "level": 0.3,
 }
 
 TASKS: dict[str, Task] = {
@@ -150,7 +156,8 @@ TASKS: dict[str, Task] = {
         test={"payload": {"mass": 0.35, "drop": 20.0}, "wind": 2.0, "ground_effect": 1.0},
         episodes=16,
         score=_accuracy,
-        batched=True,
+        batch_engine=None,
+        batch={"dtype": "float32"},
         envs=512,
         ppo=_FLIGHT_PPO,
         sac={**_SAC, "gamma": 0.98},

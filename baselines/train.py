@@ -11,23 +11,26 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.utils import set_random_seed
 from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv, VecMonitor, VecNormalize
 
+from artde_gym.layout import Layout
 from baselines.checkpoint import Checkpoints
 from baselines.export import exported
 from baselines.recipe import Recipe
 from baselines.residual import Residual
 from baselines.residual_env import ResidualEnv
+from baselines.rollouts import OpenRollouts
 from baselines.run import Progress, Run, Training, environment_kwargs, single
-from baselines.vec_env import ResidualVecEnv
+from baselines.vec_env import batched
 
 HIDDEN = (64, 64)
 CRITIC = (256, 256)  # of SAC
-HARDER, EASIER = 0.8, 0.5  # shares of training episodes without a fall: above, below which the level moves
+HARDER, EASIER = 0.65, 0.4  # shares of training episodes without a fall: above, below which the level moves
 ENDED = 8  # episodes that such a share needs
 SAC_INTERVAL = 4096  # decisions between two checkpoints
 
@@ -42,21 +45,23 @@ def train(training: Training, out: str | Path, on_progress: Callable[[Progress],
         TrainingError: if `out` holds a run of another configuration.
     """
     run = Run(training, Path(out), on_progress)
-    env, residual = _environments(training, run)
+    env, residual = environments(training, run)
     try:
-        _Trainer(run, env, residual).go()
+        Trainer(run, env, residual).go()
     finally:
         env.close()
     return run.exported
 
 
-class _Trainer:
+class Trainer:
+    """A run's environments, model and checkpoints; `learn` is one interval, `go` all that are left."""
+
     def __init__(self, run: Run, env: VecEnv, residual: Residual) -> None:
         self.run, self.residual = run, residual
         training, task = run.training, run.task
         options = {**(task.ppo if training.algo == "ppo" else task.sac), **training.options}
         self.env = VecNormalize(VecMonitor(env), gamma=options["gamma"])
-        self.model = _model(training, self.env, options)
+        self.model = _model(training, self.env, options, residual.features)
         self.model.set_logger(configure(str(run.folder / "tensorboard"), ["tensorboard"]))
         self.interval = SAC_INTERVAL
         if training.algo == "ppo":
@@ -71,14 +76,14 @@ class _Trainer:
         run, training = self.run, self.run.training
         self._report(self.steps)
         while self.steps < training.steps and run.state["stale"] < training.patience:
-            self._learn()
+            self.learn()
             if self.number % training.test_every == 0 or self.steps >= training.steps:
                 found = run.test(exported(self.model, self.env), self.residual, self.steps, {"level": self.level})
                 self._log({f"test/{name}": value for name, value in found.items()})
             state = {"interval": self.number, "steps": self.steps, "level": self.level, **run.state}
             self.checkpoints.save(self.model, self.env, state)
 
-    def _learn(self) -> None:
+    def learn(self) -> None:
         """One interval, from fresh episodes."""
         run, model = self.run, self.model
         words = np.random.SeedSequence([run.training.seed, self.number]).generate_state(2)
@@ -130,14 +135,11 @@ class _Watcher(BaseCallback):
         return 1.0 - self._fell / self._ended if self._ended >= ENDED else None
 
 
-def _environments(training: Training, run: Run) -> tuple[VecEnv, Residual]:
+def environments(training: Training, run: Run) -> tuple[VecEnv, Residual]:
     """Environments of a training, and the residual that they share."""
     kwargs, task = environment_kwargs(training), run.task
-    if task.batched:
-        kwargs.pop("engine", None)  # it is one
-        count = training.envs or task.envs or 1
-        batch = gym.make_vec(training.env_id, count, vectorization_mode="vector_entry_point", dtype="float32", **kwargs)
-        env = ResidualVecEnv(batch, training.recipe)
+    if run.batched:
+        env = batched(training.env_id, training.recipe, training.envs or task.envs, kwargs)
         return env, env.residual
     count = training.envs or training.workers
     makers: list[Callable[[], gym.Env[Any, Any]]] = [
@@ -152,7 +154,7 @@ def _worker_env(env_id: str, kwargs: dict[str, Any], recipe: Recipe) -> Residual
     return single(env_id, kwargs, recipe)
 
 
-def _model(training: Training, env: VecNormalize, options: dict[str, Any]) -> Any:
+def _model(training: Training, env: VecNormalize, options: dict[str, Any], features: Layout) -> Any:
     policy: dict[str, Any] = {"activation_fn": torch.nn.Tanh, "net_arch": list(HIDDEN)}
     common: dict[str, Any] = {"device": "cpu", "seed": training.seed}
     if training.algo == "sac":
@@ -161,4 +163,12 @@ def _model(training: Training, env: VecNormalize, options: dict[str, Any]) -> An
     own = ("log_std_init", "net_arch")
     policy |= {name: options[name] for name in own if name in options}
     others = {name: value for name, value in options.items() if name not in own}
+    if "gate" in features.slices:
+
+        def gate(seen: NDArray[Any]) -> NDArray[Any]:
+            at = features["gate"].start
+            statistics: Any = env.obs_rms
+            return seen[:, at] * np.sqrt(statistics.var[at]) + statistics.mean[at]
+
+        others |= {"rollout_buffer_class": OpenRollouts, "rollout_buffer_kwargs": {"gate": gate}}
     return PPO("MlpPolicy", env, policy_kwargs=policy, **others, **common)

@@ -6,9 +6,7 @@ the mean of the distribution. The state is the list of values told so far: telli
 
 from __future__ import annotations
 
-import functools
 import json
-import multiprocessing
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,30 +17,32 @@ from numpy.typing import NDArray
 
 from baselines.balance import GAINS, balance_network
 from baselines.errors import TrainingError
-from baselines.recipe import Recipe
-from baselines.residual_env import ResidualEnv
-from baselines.run import Progress, Run, Training, environment_kwargs, single
+from baselines.network import Network
+from baselines.run import Progress, Run, Training, environment_kwargs
 from baselines.tasks import push
+from baselines.vec_env import ResidualVecEnv, batched
 
 POPULATION = 14
-PUSHES = 10  # episodes of each candidate
+PUSHES = 16  # episodes of each candidate
 SPREAD = 0.2  # of the first generation
 DURATION = 5.5  # s, of an episode
-_PUSH = {"push": [push({"choice": [15.0, 20.0, 25.0, 30.0]}, start={"uniform": [2.3, 3.3]})]}
+_PUSH = {"push": [push({"choice": [15.0, 20.0, 25.0, 30.0]}, start={"uniform": [2.2, 3.2]})]}
 
 
 def tune(training: Training, out: str | Path, on_progress: Callable[[Progress], None] | None = None) -> Path:
     """Tune, or continue, and return the folder of the best gains so far; `steps` counts decisions.
 
     Raises:
-        TrainingError: if `out` holds a run of another configuration, or the robot has no such law.
+        TrainingError: if `out` holds a run of another configuration, the robot has no such law, or the engine no batch.
     """
-    if training.recipe.robot != "ojas" or training.recipe.channel != "synergies":
+    if training.recipe.robot != "ojas" or training.recipe.channel == "joints":
         raise TrainingError("recipe", training.recipe, "the biped's synergies, of which the law has gains")
     run = Run(training, Path(out), on_progress)
+    if not run.batched:
+        raise TrainingError("engine", training.env_kwargs.get("engine"), repr(run.task.batch_engine))
     kwargs = {**environment_kwargs(training), "duration": DURATION, "disturbances": _PUSH}
-    judge = functools.partial(_judge, training.env_id, kwargs, training.recipe)
-    residual = single(training.env_id, kwargs, training.recipe).residual
+    env = batched(training.env_id, training.recipe, POPULATION * PUSHES, kwargs)
+    residual = env.residual
     file = run.folder / "generations.json"
     told: list[dict[str, Any]] = []
     if file.exists():
@@ -50,30 +50,29 @@ def tune(training: Training, out: str | Path, on_progress: Callable[[Progress], 
         told = stored["generations"]
         run.state = stored["state"]
     strategy = CMA(np.zeros(GAINS), SPREAD, population_size=POPULATION, seed=training.seed)
-    with multiprocessing.get_context("spawn").Pool(training.workers) as pool:
-        steps, generation = 0, 0
-        while steps < training.steps and not strategy.should_stop():
-            candidates = [strategy.ask() for _ in range(POPULATION)]
-            if generation < len(told):
-                costs = told[generation]["costs"]
-                steps = told[generation]["steps"]
-            else:
-                seeds = np.random.SeedSequence([training.seed, generation]).generate_state(PUSHES).tolist()
-                networks = [balance_network(gains, residual.features, residual.actions) for gains in candidates]
-                found = pool.map(functools.partial(judge, seeds=seeds), networks, chunksize=1)
-                costs = [cost for cost, _ in found]
-                steps += sum(count for _, count in found)
-            strategy.tell(list(zip(candidates, costs, strict=True)))
-            generation += 1
-            if generation > len(told):
-                told.append({"costs": costs, "steps": steps})
-                if generation % training.test_every == 0:
-                    network = balance_network(_mean(strategy), residual.features, residual.actions)
-                    run.test(network, residual, steps, {"mean_cost": float(np.mean(costs))})
-                part = file.with_suffix(".part")
-                part.write_text(json.dumps({"state": run.state, "generations": told}))
-                part.replace(file)
-                run.report(steps, f"generation {generation}, mean cost {np.mean(costs):.3f}")
+    steps, generation = 0, 0
+    while steps < training.steps and not strategy.should_stop():
+        candidates = [strategy.ask() for _ in range(POPULATION)]
+        if generation < len(told):
+            costs = told[generation]["costs"]
+            steps = told[generation]["steps"]
+        else:
+            seeds = np.random.SeedSequence([training.seed, generation]).generate_state(PUSHES).tolist()
+            networks = [balance_network(gains, residual.features, residual.actions) for gains in candidates]
+            costs, count = _judge(env, networks, seeds)
+            steps += count
+        strategy.tell(list(zip(candidates, costs, strict=True)))
+        generation += 1
+        if generation > len(told):
+            told.append({"costs": costs, "steps": steps})
+            if generation % training.test_every == 0:
+                network = balance_network(_mean(strategy), residual.features, residual.actions)
+                run.test(network, residual, steps, {"mean_cost": float(np.mean(costs))})
+            part = file.with_suffix(".part")
+            part.write_text(json.dumps({"state": run.state, "generations": told}))
+            part.replace(file)
+            run.report(steps, f"generation {generation}, mean cost {np.mean(costs):.3f}")
+    env.close()
     return run.exported
 
 
@@ -81,24 +80,19 @@ def _mean(strategy: CMA) -> NDArray[np.float64]:
     return np.asarray(strategy.mean)
 
 
-_kept: dict[str, ResidualEnv] = {}
-"""A worker's environment; building one takes a second."""
-
-
-def _judge(env_id: str, kwargs: dict[str, Any], recipe: Recipe, network: Any, seeds: list[int]) -> tuple[float, int]:
-    """Share of falls, a little less for late ones and for small actions, and decisions taken."""
-    if env_id not in _kept:
-        _kept[env_id] = single(env_id, kwargs, recipe)
-    env, cost, steps = _kept[env_id], 0.0, 0
-    for seed in seeds:
-        features, _ = env.reset(seed=int(seed))
-        terminated, over, count, effort = False, False, 0, 0.0
-        while not over:
-            action = network(features)
-            features, _, terminated, truncated, _ = env.step(action)
-            over, count, effort = terminated or truncated, count + 1, effort + float(action.dot(action))
-        if terminated:
-            cost += 1.0 - 0.3 * count * recipe.hold / DURATION
-        cost += 0.002 * effort / count
-        steps += count
-    return cost / len(seeds), steps
+def _judge(env: ResidualVecEnv, networks: list[Network], seeds: list[int]) -> tuple[list[float], int]:
+    """Of each candidate one minus its mean return up to a fall, by what can be had at most; decisions taken."""
+    weights = np.repeat([network.layers[0][0] for network in networks], len(seeds), axis=0)
+    law, recipe = networks[0], env.residual.recipe
+    every = Network(law.mean, law.variance, ((weights, law.layers[0][1]),))  # a law of its own for each environment
+    env.seed(seeds * len(networks))
+    features: Any = env.reset()
+    going = np.ones(env.num_envs, np.bool_)
+    returns, count = np.zeros(env.num_envs), 0
+    while going.any():
+        features, rewards, done, _ = env.step(every(features))
+        returns += np.where(going, rewards, 0.0)
+        count += int(going.sum())
+        going &= ~done
+    most = DURATION / recipe.hold * sum(scale for scale in env.residual.coupling.reward_scales.values() if scale > 0)
+    return (1.0 - returns.reshape(len(networks), -1).mean(axis=1) / most).tolist(), count

@@ -1,8 +1,8 @@
-"""The batched quadrotor under a base controller as a vector environment of Stable-Baselines3."""
+"""A batched environment under a base controller as a vector environment of Stable-Baselines3."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -15,6 +15,7 @@ from baselines.coupling import total
 from baselines.recipe import Recipe
 from baselines.residual import Residual, ResidualMemory
 from baselines.residual_env import action_space, agent_space
+from baselines.tasks import task
 from controllers.laws.tracking import Array
 from controllers.policies import choose
 
@@ -22,9 +23,9 @@ Float = NDArray[np.float32]
 
 
 class ResidualVecEnv(VecEnv):
-    """What `ResidualEnv` is, for all vehicles of one batched environment; one step is one decision of each.
+    """What `ResidualEnv` is, for all robots of one batched environment; one step is one decision of each.
 
-    An episode that ends begins anew at once, as Stable-Baselines3 expects; its last observation is in
+    An episode that ends begins anew with the next decision, as Stable-Baselines3 expects; its last observation is in
     `infos[i]["terminal_observation"]`.
 
     Args:
@@ -32,14 +33,12 @@ class ResidualVecEnv(VecEnv):
         recipe: of the residual.
 
     Raises:
-        OptionError: if the recipe's `hold` is not the control period: what ends in between would have to wait.
+        OptionError: if the recipe is another robot's, or `hold` is no whole number of control periods.
     """
 
     def __init__(self, env: Any, recipe: Recipe) -> None:
         self.env = env
         self.residual = Residual.of(env, recipe)
-        if self.residual.periods != 1:
-            raise OptionError("hold", recipe.hold, f"the control period, {env.control_period:g} s")
         super().__init__(env.num_envs, agent_space(self.residual), action_space(self.residual))
         self._observation: Array = np.zeros(0)
         self._memory: ResidualMemory | None = None
@@ -53,8 +52,15 @@ class ResidualVecEnv(VecEnv):
         self.reset_infos = [{"disturbances": drawn} for drawn in info["disturbances"]]
         self._reset_seeds()
         self._reset_options()
-        self._memory = self.residual.start(self._observation)
-        return self._features()
+        features, self._memory = self._seen(self._observation, self.residual.start(self._observation))
+        return features
+
+    def seed(self, seed: int | Sequence[int] | None = None) -> list[int | None]:
+        """Seeds of the next reset: one for each environment, or a number from which on they count."""
+        if seed is None or isinstance(seed, int):
+            return list(super().seed(seed))
+        self._seeds = list(seed)
+        return self._seeds
 
     def step_async(self, actions: NDArray[Any]) -> None:
         if actions.shape != (self.num_envs, len(self.residual.actions)):
@@ -66,21 +72,28 @@ class ResidualVecEnv(VecEnv):
     def step_wait(self) -> tuple[Float, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         if self._memory is None:
             raise gym.error.ResetNeeded("the episodes have not begun: call reset()")
-        memory = self.residual.decide(self._memory, self._action)
-        force, self._memory = self.residual.control(self._observation, memory)
-        self._observation, _, terminated, truncated, _ = self.env.step(force)
-        features = self._features()
+        observation, memory = self._observation, self.residual.decide(self._memory, self._action)
+        fell = done = np.zeros(self.num_envs, np.bool_)
+        for _ in range(self.residual.periods):
+            force, after = self.residual.control(observation, memory)
+            seen, _, terminated, truncated, _ = self.env.step(force)
+            if done.any():  # what ended in this decision waits as it was
+                seen, after = choose(done, (observation, memory), (seen, after))
+                terminated, truncated = terminated & ~done, truncated & ~done
+            observation, memory = seen, after
+            fell, done = fell | terminated, done | terminated | truncated
+        features, memory = self._seen(observation, memory)
         coupling = self.residual.coupling
-        terms = coupling.reward_terms(self._observation, self._memory.coupling, terminated)
+        terms = coupling.reward_terms(observation, memory.coupling, fell)
         rewards = total(coupling.reward_scales, terms).astype(np.float32)
-        done = terminated | truncated
         infos = list(self._infos)
         if done.any():
             for i in np.flatnonzero(done).tolist():
-                infos[i] = {"terminal_observation": features[i], "TimeLimit.truncated": not terminated[i]}
-            self._observation, _ = self.env.reset(options={"reset_mask": done})
-            self._memory = choose(done, self.residual.start(self._observation), self._memory)
-            features = np.where(done[:, None], self._features(), features)
+                infos[i] = {"terminal_observation": features[i], "TimeLimit.truncated": not fell[i]}
+            observation, _ = self.env.reset(options={"reset_mask": done})
+            begun, fresh = self._seen(observation, self.residual.start(observation))
+            features, memory = choose(done, (begun, fresh), (features, memory))
+        self._observation, self._memory = observation, memory
         return features, rewards, done, infos
 
     def close(self) -> None:
@@ -91,10 +104,10 @@ class ResidualVecEnv(VecEnv):
         return [getattr(owner, attr_name, None)] * len(list(self._get_indices(indices)))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        raise OptionError("attribute to set", attr_name, "none: the vehicles share one environment")
+        raise OptionError("attribute to set", attr_name, "none: they share one environment")
 
     def env_method(self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any) -> list[Any]:
-        raise OptionError("method to call", method_name, "none: the vehicles share one environment")
+        raise OptionError("method to call", method_name, "none: they share one environment")
 
     def env_is_wrapped(self, wrapper_class: type[gym.Wrapper[Any, Any, Any, Any]], indices: Any = None) -> list[bool]:
         return [False] * len(list(self._get_indices(indices)))
@@ -102,7 +115,13 @@ class ResidualVecEnv(VecEnv):
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
         return [None] * self.num_envs
 
-    def _features(self) -> Float:
-        assert self._memory is not None
-        features, self._memory = self.residual.observe(self._observation, self._memory)
-        return features.astype(np.float32, order="C")
+    def _seen(self, observation: Array, memory: ResidualMemory) -> tuple[Float, ResidualMemory]:
+        features, memory = self.residual.observe(observation, memory)
+        return features.astype(np.float32, order="C"), memory
+
+
+def batched(env_id: str, recipe: Recipe, count: int, kwargs: Mapping[str, Any]) -> ResidualVecEnv:
+    """So many of an environment, built with `kwargs`, in one batch with an agent's action for each."""
+    own = {name: value for name, value in kwargs.items() if name != "engine"}  # a batch is an engine
+    own |= task(env_id).batch
+    return ResidualVecEnv(gym.make_vec(env_id, count, vectorization_mode="vector_entry_point", **own), recipe)

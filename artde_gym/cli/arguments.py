@@ -20,7 +20,7 @@ Seed = Annotated[int, typer.Option(help="Seed of everything.")]
 Workers = Annotated[int | None, typer.Option(help="Processes. Default: all cores.")]
 Out = Annotated[Path | None, typer.Option(help="Results folder. Default: runs/<date and time>.")]
 Backend = Annotated[
-    str, typer.Option(help="single: an engine for each episode; batch: thousands at once, where there is a vector.")
+    str, typer.Option(help="single: one environment after the other; batch: many at once (of the biped, in MuJoCo).")
 ]
 Engine = Annotated[str | None, typer.Option(help=f"Physics engine: {' or '.join(ENGINES)}.")]
 Disturbances = Annotated[str | None, typer.Option(help="JSON, in place of those that belong to what is run.")]

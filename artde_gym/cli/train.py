@@ -44,7 +44,7 @@ def train(
         seed=seed,
         env_kwargs=kwargs,
         options=json_object("--options", options),
-        workers=1 if task(env).batched else processes(workers),
+        workers=processes(workers),
         patience=patience,
         test_every=test_every,
     )

@@ -275,7 +275,7 @@ def _try_out(
     for cell in cells:
         env = tried(backend, cell)
         for name, item in named.items():
-            policy_of(item, env, gains.get(name, {}))
+            policy_for(item, env, gains.get(name, {}))
 
 
 def tried(backend: Backend, cell: Cell) -> Any:
@@ -319,10 +319,10 @@ def run_task(task: Task, on_progress: Callable[[float], None]) -> list[Episode]:
     options: dict[str, Any] = {"trace_hz": task.trace_hz, "phases": task.cell.phases, "on_progress": on_progress}
     if task.backend == "batch":
         env = _vector(task.cell, len(task.seeds))
-        policy = policy_of(task.policy, env, task.gains)
+        policy = policy_for(task.policy, env, task.gains)
         return run_batch(env, policy, task.seeds, traced=task.traced, **options)
     env, reset_options = _single(task.cell)
-    policy = policy_of(task.policy, env, task.gains)
+    policy = policy_for(task.policy, env, task.gains)
     results = [run_episode(env, policy, seed, options=reset_options, **options) for seed in task.seeds]
     return [result if i < task.traced else Episode(result.row, {}) for i, result in enumerate(results)]
 
@@ -344,8 +344,13 @@ def duration_of(results: list[Episode]) -> float:
     return max(result.row["duration_s"] for result in results)
 
 
-def policy_of(item: Policy | ControllerSpec, env: Any, gains: dict[str, Any]) -> Policy:
-    """The policy for an environment, with gains in place of its preset's."""
+def policy_for(item: Policy | ControllerSpec, env: Any, gains: dict[str, Any]) -> Policy:
+    """What drives an environment: a registered controller built for it, or the policy itself.
+
+    Raises:
+        OptionError: for gains of a policy.
+        GainError: for a bad gain.
+    """
     if isinstance(item, ControllerSpec):
         register_spec(item)  # a worker knows only what this project registers itself
         return make_controller(item.name, env, **gains)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import functools
 import platform
 import subprocess
 import sys
@@ -37,6 +38,7 @@ def versions(packages: Iterable[str]) -> dict[str, str]:
     return {name: version for name in packages if (version := _version(name)) is not None}
 
 
+@functools.cache
 def _version(package: str) -> str | None:
     try:
         return metadata.version(package)

@@ -14,7 +14,7 @@ from typing import Any, Literal, get_args
 
 import pandas as pd
 
-from artde_gym.errors import OptionError, StoreError, among
+from artde_gym.errors import ArtdeGymError, OptionError, StoreError, among
 from artde_gym.evaluation import sweep_part
 from artde_gym.evaluation.evaluate import (
     CHUNK,
@@ -24,7 +24,7 @@ from artde_gym.evaluation.evaluate import (
     duration_of,
     episode_seed,
     labels_of,
-    policy_of,
+    policy_for,
     run_task,
     tried,
 )
@@ -137,8 +137,17 @@ def _runs(
     on_wait: Callable[[], None],
 ) -> Runs:
     if executor == "ray":
-        return run_on_ray(run_task, tasks, workers, address, on_wait)
-    return run_here(run_task, tasks, on_time) if workers == 1 else run_parallel(run_task, tasks, workers, on_time)
+        return run_on_ray(_run, tasks, workers, address, on_wait)
+    return run_here(_run, tasks, on_time) if workers == 1 else run_parallel(_run, tasks, workers, on_time)
+
+
+def _run(task: Task, on_time: Callable[[float], None]) -> list[Episode]:
+    """Run a task; what goes wrong in one of many cells is told with the cell."""
+    try:
+        return run_task(task, on_time)
+    except ArtdeGymError as error:
+        cell = f"{task.controller} with {task.gains}, {task.cell.env_id} with {task.cell.kwargs}, seeds {task.seeds}"
+        raise type(error)(f"{error.field} ({cell})", error.value, error.allowed) from error
 
 
 def _refuse_others(plan: Design, store: SweepStore) -> None:
@@ -162,7 +171,7 @@ def _check(plan: Design, points: Mapping[str, Point], done: set[Key], report: On
     for i, (name, point) in enumerate(fresh, start=1):
         if _place(point) != last:
             last, env = _place(point), tried(plan.backend, point.cell)
-        policy_of(point.spec, env, point.gains)
+        policy_for(point.spec, env, point.gains)
         report("cells checked", Update(_task(plan, name, point, [0]), 0.0, True, i, len(fresh)))
 
 

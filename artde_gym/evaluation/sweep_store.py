@@ -122,12 +122,17 @@ class SweepStore:
         """Write all that waits as one part; errors as of `add`."""
         if not self._waiting:
             return
-        with self._writing():
-            self._widen(sweep_part.types_of(self._waiting))
-            path = self.folder / "episodes" / f"part-{self._number() + 1:06d}.parquet"
-            self._write(path, sweep_part.table(self._waiting, self._types))
-        self.done.update((row["cell"], row["episode"]) for row in self._waiting)
-        self._waiting.clear()
+        rows, self._waiting = self._waiting, []  # so that no interruption makes them two parts
+        path = self.folder / "episodes" / f"part-{self._number() + 1:06d}.parquet"
+        try:
+            with self._writing():
+                self._widen(sweep_part.types_of(rows))
+                self._write(path, sweep_part.table(rows, self._types))
+        except KeyboardInterrupt:
+            if not path.exists():
+                self._waiting = rows
+            raise
+        self.done.update((row["cell"], row["episode"]) for row in rows)
         self._flushed = time.monotonic()
 
     def finish(self) -> None:

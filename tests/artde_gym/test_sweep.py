@@ -16,8 +16,10 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
+import artde_gym
+from artde_gym import registration
 from artde_gym.cli import app
-from artde_gym.errors import ArtdeGymError, DisturbanceError, OptionError, StoreError, WorkerError
+from artde_gym.errors import ActionError, ArtdeGymError, DisturbanceError, OptionError, StoreError, WorkerError
 from artde_gym.evaluation import evaluate, read_sweep, sweep
 from artde_gym.evaluation.workers import run_parallel
 from controllers import GainError
@@ -159,6 +161,24 @@ def test_without_its_packages_the_extra_is_named(tmp_path, monkeypatch, name):
         sweep(tmp_path / "sweep.yaml", tmp_path / "run")
 
 
+def test_an_error_in_one_of_many_cells_names_the_cell(tmp_path, monkeypatch):
+    (tmp_path / "broken.py").write_text(
+        "import numpy as np\n"
+        "class Broken:\n"
+        "    def __init__(self, env, value=0.0):\n"
+        "        self.action = np.full(4, value / value - 1.0 if value else np.nan)\n"
+        "    def predict(self, observation, state=None, episode_start=None, deterministic=True):\n"
+        "        return self.action, None\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(registration, "_controllers", registration.registered_controllers())
+    artde_gym.register_controller("broken", "broken:Broken")
+    given = {"env": "QuadInfinity-Payload-v0", "controller": "broken", "env_kwargs": QUICK}
+    with pytest.raises(ActionError, match=r"broken with \{'value': 0\.0\}.*duration"):
+        sweep({**given, "grid": {"gains.broken.value": [1.0, 0.0]}}, tmp_path / "run")
+    assert read_sweep(tmp_path / "run")["gains.value"].tolist() == [1.0]  # what was finished before is kept
+
+
 # ---------------------------------------------------------------- workers that die
 
 WORK = """
@@ -279,9 +299,54 @@ def test_killed_five_times_it_ends_with_the_same_bits(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_ray_cluster_gives_the_same_bits(tmp_path, file, whole):
+def test_ray_gives_the_same_bits(tmp_path, file, whole):
     pytest.importorskip("ray", reason="Ray is not installed (extra scale)")
     arguments = command(file, tmp_path / "run", "--engine", "ray", "--workers", "2")
     outcome = subprocess.run(arguments, capture_output=True, text=True, timeout=300, check=False)
     assert outcome.returncode == 0, outcome.stderr
+    same(read_sweep(tmp_path / "run"), whole)
+
+
+CLUSTER = """
+import sys
+import ray
+
+ray.init("local", num_cpus=2, include_dashboard=False, object_store_memory=80 * 2**20, log_to_driver=False)
+print(ray.get_runtime_context().gcs_address, flush=True)
+sys.stdin.read()
+"""
+
+
+def busy_worker_of(address: str) -> int | None:
+    """A process of the cluster that is at an episode."""
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            if (path / "cmdline").read_bytes().startswith(b"ray::_on_node"):
+                parent = (path / "stat").read_text().rpartition(")")[2].split()[1]
+                if address.encode() in (path.parent / parent / "cmdline").read_bytes():
+                    return int(path.name)
+        except OSError:
+            continue
+    return None
+
+
+@pytest.mark.slow
+def test_a_running_cluster_that_loses_a_worker_gives_the_same_bits(tmp_path, file, whole):
+    pytest.importorskip("ray", reason="Ray is not installed (extra scale)")
+    quiet = {**os.environ, "RAY_USAGE_STATS_ENABLED": "0"}
+    pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen([sys.executable, "-c", CLUSTER], env=quiet, text=True, **pipes) as cluster:
+        assert cluster.stdout
+        address = cluster.stdout.readline().strip()
+        arguments = command(file, tmp_path / "run", "--engine", "ray", "--address", address)
+        with subprocess.Popen(arguments, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+            worker = None
+            while worker is None and process.poll() is None:
+                worker = busy_worker_of(address)
+            if worker is not None:
+                os.kill(worker, signal.SIGKILL)
+            _, errors = process.communicate(timeout=300)
+        cluster.communicate()
+    assert worker is not None, errors
+    assert process.returncode == 0, errors
     same(read_sweep(tmp_path / "run"), whole)

@@ -160,6 +160,27 @@ def test_killed_at_any_step_it_is_whole_and_goes_on(tmp_path, whole, kind):
         assert sorted(path.name for path in folder.iterdir()) == ["episodes", "sweep.json", "sweep.lock"]
 
 
+@pytest.mark.parametrize("after", [False, True])
+def test_an_interrupt_while_it_writes_stores_everything_once(tmp_path, monkeypatch, after):
+    replace = os.replace
+
+    def interrupted(*paths: Any) -> None:
+        monkeypatch.setattr(os, "replace", replace)
+        if after:
+            replace(*paths)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sweep_store, "SHORTEST", 1e9)
+    monkeypatch.setattr(sweep_store, "LONGEST", 1e9)
+    with SweepStore(tmp_path) as store:
+        store.begin("{}", {})
+        store.add(FIRST)
+        monkeypatch.setattr(os, "replace", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            store.flush()
+    assert read_sweep(tmp_path)["episode"].tolist() == [0, 1]
+
+
 # ---------------------------------------------------------------- corrupt
 
 

@@ -32,8 +32,8 @@ ENVIRONMENTS = {
     "QuadInfinity-Payload-v0": ("q450", {"duration": 3.0}),
 }
 SLOW = {"computed-torque"}
-LAWS = [name for name in registered_controllers() if name != "tde+ppo"]
-QUADROTOR_ONLY, BIPED_ONLY = {"asmc", "indi", "geometric"}, {"computed-torque"}
+LAWS = list(registered_controllers())
+QUADROTOR_ONLY, BIPED_ONLY = {"asmc", "indi", "geometric"}, {"computed-torque", "tde+balance"}
 CASES = [
     (env_id, base)
     for env_id, (name, _) in ENVIRONMENTS.items()
@@ -137,7 +137,7 @@ def walking_observation(rng, load_left: float) -> np.ndarray:
     return observation
 
 
-@pytest.mark.parametrize("channel", ["synergies", "joints"])
+@pytest.mark.parametrize("channel", ["synergies", "wide-synergies", "joints"])
 def test_the_mirrored_robot_gets_the_mirrored_residual(channel):
     rng = np.random.default_rng(2)
     env = make("BipedWalk-Payload-v0")

@@ -156,9 +156,16 @@ def test_another_robot_is_refused(folder):
     biped = gym.make("BipedWalk-Payload-v0", disable_env_checker=True, duration=1.0, disturbances={})
     with pytest.raises(PolicyFileError, match=r"robot of 'tde\+x' is 'q450'; allowed: 'ojas'"):
         baselines.load(folder, biped)
-    with pytest.raises(UnknownNameError):
-        controllers.make("tde+ppo", biped)
     biped.close()
+
+
+def test_a_shipped_policy_belongs_to_an_environment(env):
+    with pytest.raises(UnknownNameError, match=r"environment of a trained policy is 'QuadInfinity-Payload-v0'"):
+        controllers.make("tde+balance", env)
+    with pytest.raises(UnknownNameError, match="environment of a trained policy is ''"):
+        controllers.make("tde+ppo", type(env.unwrapped)())  # nobody gave it an id
+    vector = gym.make_vec("QuadInfinity-Payload-v0", 2, vectorization_mode="vector_entry_point")
+    assert controllers.make("tde+ppo", vector).name == "tde+ppo"
 
 
 def test_zip_bombs_of_names_do_not_matter(folder):
@@ -188,7 +195,7 @@ def test_shipped_policies_fit_their_environments_and_have_a_card(name):
     assert "artde-gym train" in card
     assert json.loads((SHIPPED / name / "policy.json").read_text())["weights_sha256"] in card
     env = gym.make(saved.about["env_id"], disable_env_checker=True, duration=1.0)
-    policy = controllers.make("tde+ppo", env)
+    policy = controllers.make(saved.name, env)
     observation, _ = env.reset(seed=0)
     state = None
     for _ in range(3):

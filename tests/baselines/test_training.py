@@ -24,9 +24,10 @@ from baselines.errors import TrainingError
 from baselines.export import exported
 from baselines.recipe import Recipe
 from baselines.residual_env import ResidualEnv
+from baselines.rollouts import OpenRollouts
 from baselines.run import Run, Training
-from baselines.train import _environments, _Trainer, train
-from baselines.vec_env import ResidualVecEnv
+from baselines.train import Trainer, environments, train
+from baselines.vec_env import ResidualVecEnv, batched
 
 QUADROTOR = "QuadInfinity-Payload-v0"
 GALE = {"wind": 2.0, "ground_effect": 1.0}
@@ -124,8 +125,8 @@ def test_numpy_inference_equals_torch(tmp_path, quick):
     rng = np.random.default_rng(0)
     for algo in ("ppo", "sac"):
         run = Run(small(algo), tmp_path / algo)
-        env, residual = _environments(run.training, run)
-        trainer = _Trainer(run, env, residual)
+        env, residual = environments(run.training, run)
+        trainer = Trainer(run, env, residual)
         with torch.no_grad():
             for parameter in trainer.model.policy.parameters():
                 parameter += 0.05 * torch.randn_like(parameter)
@@ -190,14 +191,74 @@ def test_the_adapter_is_what_the_single_environment_is():
     single.close()
 
 
+ANYWHERE = [{"normal": [0.0, 1.0]}, {"normal": [0.0, 1.0]}, 0.0]
+FALLING = {
+    "duration": 1.2,
+    "self_collision": True,
+    "disturbances": {
+        "push": [
+            {
+                "body": "chest",
+                "magnitude": {"choice": [0.0, 60.0]},
+                "direction": ANYWHERE,
+                "start": {"uniform": [0.05, 0.4]},
+            }
+        ],
+        "payload": 0.5,
+    },
+}
+
+
+def test_the_adapter_is_the_single_biped_to_the_bit():
+    """Falls within a decision, and what begins after them, included."""
+    pytest.importorskip("mujoco")
+    vector = batched("BipedPush-v0", Recipe("ojas"), 3, FALLING)
+    single = ResidualEnv(gym.make("BipedPush-v0", disable_env_checker=True, engine="mujoco", **FALLING), Recipe("ojas"))
+    vector.seed(7)
+    many: Any = vector.reset()
+    one, _ = single.reset(seed=9)
+    rng = np.random.default_rng(0)
+    falls = ends = 0
+    for _ in range(150):
+        np.testing.assert_array_equal(many[2], one)
+        actions = rng.uniform(-1, 1, (3, 11)).astype("f4")
+        many, rewards, done, infos = vector.step(actions)
+        one, reward, terminated, truncated, _ = single.step(actions[2])
+        assert (rewards[2], done[2]) == (np.float32(reward), terminated or truncated)
+        if done[2]:
+            ends, falls = ends + 1, falls + terminated
+            np.testing.assert_array_equal(infos[2]["terminal_observation"], one)
+            one, _ = single.reset()
+    assert ends > falls > 0
+    vector.close()
+    single.close()
+
+
 def test_the_adapter_says_what_it_cannot_do():
     env = ResidualVecEnv(batch(2, duration=1.0), Recipe("q450"))
     assert VecMonitor(env).num_envs == 2
-    with pytest.raises(OptionError, match="none: the vehicles share one environment"):
+    with pytest.raises(OptionError, match="none: they share one environment"):
         env.set_attr("x", 1)
-    with pytest.raises(OptionError, match=r"hold is 0\.03"):
-        ResidualVecEnv(batch(2, duration=1.0), Recipe("q450", hold=0.03))
+    with pytest.raises(OptionError, match=r"hold is 0\.02"):
+        ResidualVecEnv(batch(2, duration=1.0), Recipe("q450", hold=0.02))
     env.close()
+
+
+def test_decisions_under_a_shut_gate_are_mostly_left_out_of_rollouts():
+    steps, count = 10, 4
+    box = gym.spaces.Box(-np.inf, np.inf, (2,), np.float32)
+    rollouts = OpenRollouts(steps, box, gym.spaces.Box(-1.0, 1.0, (1,)), n_envs=count, gate=lambda seen: seen[:, 1])
+    rng = np.random.default_rng(0)
+    gates = np.where(rng.random((steps, count)) < 0.5, 0.0, 0.8)
+    for k, row in enumerate(gates):
+        seen = np.stack([count * k + np.arange(count), row], axis=1)
+        value = torch.zeros(count)
+        rollouts.add(seen, np.zeros((count, 1)), np.zeros(count), np.zeros(count), value, value)
+    for _ in range(2):  # epochs
+        got = np.concatenate([batch.observations.numpy() for batch in rollouts.get(7)])
+        assert len(set(got[:, 0])) == len(got)
+        assert set(got[got[:, 1] > 0, 0]) == set(np.flatnonzero(gates.ravel()))
+        assert 0 < (got[:, 1] == 0).sum() <= steps * count / 5
 
 
 def returns(actor: Any, recipe: Recipe, count: int = 64) -> np.ndarray:
@@ -222,10 +283,10 @@ def test_something_is_learnt(tmp_path):
         QUADROTOR, recipe, steps=40_960, envs=128, env_kwargs={"duration": 4.0}, options=options, test_every=1000
     )
     run = Run(training, tmp_path)
-    env, residual = _environments(training, run)
-    trainer = _Trainer(run, env, residual)
+    env, residual = environments(training, run)
+    trainer = Trainer(run, env, residual)
     trainer.interval = training.steps
-    trainer._learn()
+    trainer.learn()
     env.close()
     trained = returns(exported(trainer.model, trainer.env), recipe)
     nothing = returns(lambda features: np.zeros((len(features), len(residual.actions))), recipe)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artde_gym.evaluation.environments import drawing
-from artde_gym.evaluation.evaluate import policy_of
+from artde_gym.evaluation.evaluate import policy_for
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.registration import ControllerSpec
 
@@ -48,7 +48,7 @@ def shots(
     """
     env = drawing(env_id, kwargs, width)
     try:
-        predict = policy_of(policy, env, dict(gains)).predict
+        predict = policy_for(policy, env, dict(gains)).predict
         observation, info = env.reset(seed=seed)
         state, first, over = None, True, False
         for time in times:

@@ -1,0 +1,6 @@
+"""Speed and memory of this machine and this release, as ratios measured in one run, so that they hold on any machine."""
+
+from artde_gym.benchmark.figure import Figure, Section
+from artde_gym.benchmark.run import SECTIONS, measure
+
+__all__ = ["SECTIONS", "Figure", "Section", "measure"]

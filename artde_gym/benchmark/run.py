@@ -1,0 +1,46 @@
+"""All sections of the benchmark by name, and running some of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from artde_gym.benchmark.figure import Section
+from artde_gym.errors import UnknownNameError, among
+from artde_gym.registration import resolved
+
+SECTIONS: dict[str, str] = {
+    "walk": "artde_gym.benchmark.walk:walking",
+    "flight": "artde_gym.benchmark.flight:flying",
+    "fleet": "artde_gym.benchmark.flight:fleets",
+    "reset": "artde_gym.benchmark.reset:resetting",
+    "controllers": "artde_gym.benchmark.calls:calling",
+    "scaling": "artde_gym.benchmark.scaling:scaling",
+    "memory": "artde_gym.benchmark.memory:growing",
+    "peers": "artde_gym.benchmark.peers:peers",
+}
+"""Name -> "module:function", called as function(quick) and giving a `Section`; a string, so that a section may need what
+is not installed, or a package that this one may not import."""
+
+
+def measure(
+    names: Sequence[str] | None = None, *, quick: bool = False, on_section: Callable[[str], None] | None = None
+) -> dict[str, Section]:
+    """Measure some sections, or all, in this process, one after the other.
+
+    Args:
+        names: of `SECTIONS`.
+        quick: a tenth of the work: for a look, not for a page.
+        on_section: called with the name of each before it begins.
+
+    Raises:
+        UnknownNameError: for a section that there is not.
+    """
+    for name in names or ():
+        if name not in SECTIONS:
+            raise UnknownNameError("section", name, among(name, SECTIONS))
+    found = {}
+    for name in names or SECTIONS:
+        if on_section is not None:
+            on_section(name)
+        found[name] = resolved(SECTIONS[name])(quick)
+    return found

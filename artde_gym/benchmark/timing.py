@@ -1,0 +1,93 @@
+"""How things are timed: all variants in turns, each by its own computing time."""
+
+from __future__ import annotations
+
+import os
+import statistics
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from artde_gym.registration import make_controller
+
+TURN = 50
+"""Steps that a variant does before it is the next one's turn."""
+
+Job = Callable[[], None]
+
+
+def in_turns(
+    variants: Mapping[str, Callable[[], Job]], rounds: int, clock: Callable[[], float] = time.process_time
+) -> dict[str, float]:
+    """Seconds that each variant takes for its job of a round, which it prepares untimed.
+
+    All of them advance in turns, so that a machine whose speed drifts is as fast for each; a variant's time is the
+    median of its turns, which a burst of other work on the machine does not move.
+
+    Args:
+        variants: name -> what prepares a job.
+        rounds: of all variants.
+        clock: computing time of this process, other processes' left out; `time.perf_counter` for threads and workers.
+    """
+    turns: dict[str, list[float]] = {name: [] for name in variants}
+    for _ in range(rounds):
+        for name, prepare in variants.items():
+            job = prepare()
+            start = clock()
+            job()
+            turns[name].append(clock() - start)
+    return {name: statistics.median(durations) for name, durations in turns.items()}
+
+
+class ClosedLoop:
+    """A controller drives an environment, or a vector of them; `actions` remembers how."""
+
+    def __init__(self, name: str, env: Any, turn: int = TURN) -> None:
+        self.env, self._turn = env, turn
+        self.policy = make_controller(name, env)
+        self.observation, _ = env.reset(seed=0)
+        self.state = None
+        self.actions: list[np.ndarray] = []
+
+    def turn(self) -> Job:
+        return self._advance
+
+    def _advance(self) -> None:
+        for _ in range(self._turn):
+            action, self.state = self.policy.predict(self.observation, self.state)
+            self.observation, *_ = self.env.step(action)
+            self.actions.append(action)
+
+
+class Replay:
+    """The last actions of a closed loop once more, in an environment alone."""
+
+    def __init__(self, loop: ClosedLoop, env: Any, turn: int = TURN) -> None:
+        self.loop, self.env, self._turn = loop, env, turn
+        env.reset(seed=0)
+
+    def turn(self) -> Job:
+        actions = [self.convert(action) for action in self.loop.actions[-self._turn :]]
+
+        def job() -> None:
+            for action in actions:
+                self.step(action)
+
+        return job
+
+    def convert(self, action: np.ndarray) -> Any:
+        """An action as `step` takes it; not timed."""
+        return action
+
+    def step(self, action: Any) -> None:
+        """One control period."""
+        self.env.step(action)
+
+
+def resident() -> int:
+    """Resident memory of this process (bytes)."""
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE")
