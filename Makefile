@@ -56,6 +56,6 @@ clean:  ## remove the environment and all caches, keep runs
 	@touch $@
 
 .venv/dev: .venv/core
-	@echo "artde-gym: installing the extras dev, docs, mujoco and rl into .venv"
-	@$(INSTALL) --editable '.[dev,docs,mujoco,rl]'
+	@echo "artde-gym: installing the extras dev, docs, mujoco, rl and video into .venv"
+	@$(INSTALL) --editable '.[dev,docs,mujoco,rl,video]'
 	@touch $@

@@ -9,7 +9,7 @@ import gymnasium as gym
 import typer
 
 from artde_gym import __version__
-from artde_gym.cli import evaluate, frontier, listing, report, reproduce, sweep, train, tune, video
+from artde_gym.cli import evaluate, frontier, listing, play, report, reproduce, sweep, train, tune, video
 from artde_gym.errors import ArtdeGymError
 from controllers import GainError
 
@@ -27,6 +27,7 @@ app.command()(reproduce.reproduce)
 app.command()(train.train)
 app.command()(report.report)
 app.command()(video.video)
+app.command()(play.play)
 app.command("list")(listing.list_everything)
 
 

@@ -35,7 +35,6 @@ _PAGE = (
     + """
 | `engine` | "bullet" | "bullet", "mujoco" | physics engine; see docs/engines.md |
 | `width`, `height` | 640, 480 | 16 to 4096 | pixels of a picture |
-| `window` | False | False, True | a window of Bullet's own, on a display; see `artde-gym play` |
 
 With `render_mode="rgb_array"`, `render` draws 30 pictures a simulated second; asked more often, it gives the last one
 again. Words of your own in `env.unwrapped.view.caption` are written into each of them.
@@ -62,7 +61,6 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         observe_ground_force: whether the observation ends with the ground's force on each foot.
         engine: physics engine.
         width, height: of pictures (pixels).
-        window: whether Bullet shows the robot in a window of its own.
         render_mode: "rgb_array" or None.
 
     Raises:
@@ -92,7 +90,6 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         engine: EngineName = "bullet",
         width: int = 640,
         height: int = 480,
-        window: bool = False,
         render_mode: Literal["rgb_array"] | None = None,
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
@@ -103,9 +100,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         )
         self.nominal_robot, self.pattern, self.control_period = walk.nominal_robot, walk.pattern, walk.control_period
         self._disturbances = walk.parse(self.default_disturbances if disturbances is None else disturbances)
-        self._engine: Engine = make_engine(
-            engine, walk.robot, task.TIME_STEP, renders=render_mode is not None, window=window
-        )
+        self._engine: Engine = make_engine(engine, walk.robot, task.TIME_STEP, renders=render_mode is not None)
         camera = Camera((0.0, 0.0, CAMERA_HEIGHT), width=width, height=height)
         self.view = View(self._engine, camera, self.control_period, share=1.0, slack=LEEWAY)
         self.metadata = {**self.metadata, **self.view.metadata}

@@ -13,7 +13,7 @@ from artde_gym.sim.engine import Engine
 
 
 class Live(abc.ABC):
-    """A part of an environment: pushes and drops that its disturbances did not foresee, and its window, if any."""
+    """A part of an environment: pushes and drops that nobody planned, and a look at its world."""
 
     nominal_robot: RobotSpec
     _engine: Engine
@@ -49,15 +49,7 @@ class Live(abc.ABC):
             self._realised = {**self._realised, "payload": payload}
         return dropped
 
-    def site(self, name: str) -> Vector:
-        """Where a site of the robot is now (m, world axes).
-
-        Raises:
-            RobotError: for a site that the robot does not have.
-        """
-        return self._engine.site(name)
-
     @property
-    def window(self) -> Any:
-        """The engine's window (`artde_gym.sim.window.Window`), or None."""
-        return self._engine.window
+    def engine(self) -> Engine:
+        """The world that the robot is in, to be looked at."""
+        return self._engine

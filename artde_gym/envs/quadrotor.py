@@ -54,7 +54,6 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
     {shared}
     | `engine` | "bullet" | "bullet", "mujoco" | physics engine; see docs/engines.md |
     | `width`, `height` | 640, 480 | 16 to 4096 | pixels of a picture |
-    | `window` | False | False, True | a window of Bullet's own, on a display; see `artde-gym play` |
 
     With `render_mode="rgb_array"`, `render` draws 30 pictures a simulated second; asked more often, it gives the last
     one again. Words of your own in `env.unwrapped.view.caption` are written into each of them.
@@ -91,7 +90,6 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         engine: EngineName = "bullet",
         width: int = 640,
         height: int = 480,
-        window: bool = False,
         render_mode: Literal["rgb_array"] | None = None,
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
@@ -109,9 +107,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self.observation_space = task.OBSERVATION.box()
         self.action_space = task.ACTION.box()
         self._low, self._high = self.action_space.low, self.action_space.high
-        self._engine: Engine = make_engine(
-            engine, self.nominal_robot, TIME_STEP, renders=render_mode is not None, window=window
-        )
+        self._engine: Engine = make_engine(engine, self.nominal_robot, TIME_STEP, renders=render_mode is not None)
         self.view = View(self._engine, CAMERA._replace(width=width, height=height), self.control_period, SHARE, LEEWAY)
         self.metadata = {**self.metadata, **self.view.metadata}
         self._engine.place(START, _NO_JOINTS)

@@ -38,6 +38,7 @@ class View:
         slack: the farthest from the middle that the robot may go (m).
 
     Attributes:
+        camera: where it is in the beginning.
         caption: words of the user's in every picture, such as the controller's name.
 
     Raises:
@@ -51,7 +52,7 @@ class View:
             if not (isinstance(size, int) and low <= size <= high):
                 raise OptionError(name, size, f"a whole number from {low} to {high}")
         self.caption = ""
-        self._engine, self._camera = engine, camera
+        self._engine, self.camera = engine, camera
         self._share, self._slack = share, slack
         rate = 1.0 / control_period
         self.metadata = {"render_fps": round(rate) if abs(rate - round(rate)) < 1e-9 else rate}
@@ -84,7 +85,7 @@ class View:
         """
         key = (int(time_s * RATE + 1e-6), over)
         if self._last is None or self._last[0] != key:
-            camera = self.camera(home)
+            camera = self.following(home)
             drawn = Image.fromarray(self._engine.render(camera))
             if path is not None:
                 _line(drawn, camera.pixels(path), PATH)
@@ -97,12 +98,12 @@ class View:
             self._last = key, np.array(drawn)
         return self._last[1]
 
-    def camera(self, home: Vector) -> Camera:
+    def following(self, home: Vector) -> Camera:
         """Where the camera is now."""
         position = np.asarray(self._engine.read().position)
         off = np.clip(self._share * (position - home), -self._slack, self._slack)
         x, y, _ = (position - off).tolist()
-        return self._camera._replace(target=(x, y, self._camera.target[2]))
+        return self.camera._replace(target=(x, y, self.camera.target[2]))
 
 
 def _words(disturbances: Mapping[str, Any], time_s: float) -> list[str]:

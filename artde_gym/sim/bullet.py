@@ -28,7 +28,6 @@ from artde_gym.sim.engine import PAYLOAD_COLOUR, PAYLOAD_LOOK, PAYLOAD_RADIUS, S
 from artde_gym.sim.ground import SUN, Shadow, paint
 from artde_gym.sim.quiet import bullet
 from artde_gym.sim.rotation import Quaternion, moved, rotated
-from artde_gym.sim.window import Window, require_window
 
 GEAR_ITERATIONS = 60  # of the solver; with 30, what is left over in the gears raises ARTDE's RMSE in S1 by a third
 BARE_ITERATIONS = 50  # without gears
@@ -43,20 +42,14 @@ _NO_JOINTS.flags.writeable = False
 
 
 class BulletEngine:
-    """One robot on a plane in a Bullet world of its own.
+    """One robot on a plane in a Bullet world of its own."""
 
-    Raises:
-        OptionError: for a window where there can be none.
-    """
-
-    def __init__(self, spec: RobotSpec, time_step: float = 0.001, *, window: bool = False) -> None:
-        if window:
-            require_window()
+    def __init__(self, spec: RobotSpec, time_step: float = 0.001) -> None:
         self.spec = spec = spec.with_rotor_links() if any(spec.armature) else spec
         self.time_step = time_step
-        self._client = bullet.connect(bullet.GUI if window else bullet.DIRECT)
+        self._client = bullet.connect(bullet.DIRECT)
         if self._client < 0:
-            raise RuntimeError("PyBullet gave no physics client: too many are open in this process, or a window is")
+            raise RuntimeError("PyBullet gave no physics client: too many are open in this process")
         self._finalizer = weakref.finalize(self, _disconnect, self._client)
         bullet.setTimeStep(time_step, physicsClientId=self._client)
         bullet.setGravity(0.0, 0.0, -9.81, physicsClientId=self._client)
@@ -67,7 +60,6 @@ class BulletEngine:
             enableFileCaching=0,
             physicsClientId=self._client,
         )
-        self.window = Window(self._client) if window else None
         self._ground = self._build_ground()
         self._robot = self._build_robot()
         self._ball = bullet.createVisualShape(  # once: Bullet never frees a visual shape
@@ -92,10 +84,6 @@ class BulletEngine:
         mesh = str(Path(pybullet_data.getDataPath()) / "plane100.obj")
         visual = bullet.createVisualShape(bullet.GEOM_MESH, fileName=mesh, physicsClientId=self._client)
         ground = bullet.createMultiBody(0.0, shape, visual, physicsClientId=self._client)
-        if self.window:  # pictures have a ground of their own
-            checks = str(Path(pybullet_data.getDataPath()) / "checker_blue.png")
-            texture = bullet.loadTexture(checks, physicsClientId=self._client)
-            bullet.changeVisualShape(ground, -1, textureUniqueId=texture, physicsClientId=self._client)
         bullet.changeDynamics(ground, -1, lateralFriction=1.0, restitution=0.0, physicsClientId=self._client)
         return ground
 
@@ -280,6 +268,11 @@ class BulletEngine:
             bullet.removeConstraint(self._holder, physicsClientId=self._client)
             self._holder = None
 
+    def payload_position(self) -> Vector | None:
+        if self._payload is None:
+            return None
+        return bullet.getBasePositionAndOrientation(self._payload, physicsClientId=self._client)[0]
+
     def _remove_payload(self) -> None:
         self.release_payload()
         if self._payload is not None:
@@ -304,10 +297,7 @@ class BulletEngine:
         size = (camera.height, camera.width)
         picture = np.asarray(rgba, dtype=np.uint8).reshape(*size, 4)[..., :3].copy()
         bare = np.isin(np.asarray(body).reshape(size), (-1, self._ground))
-        ball = None
-        if self._payload is not None:
-            ball = np.array(bullet.getBasePositionAndOrientation(self._payload, physicsClientId=self._client)[0])
-        paint(picture, bare, camera, self._shadow.polygons(self.read(), ball))
+        paint(picture, bare, camera, self._shadow.polygons(self.read(), self.payload_position()))
         return picture
 
     def close(self) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +11,6 @@ from artde_gym.arrays import Array
 from artde_gym.robots.spec import RobotSpec, Vector
 from artde_gym.sim.camera import Camera
 from artde_gym.sim.rotation import Quaternion
-
-if TYPE_CHECKING:  # it imports an engine
-    from artde_gym.sim.window import Window
 
 
 class State(NamedTuple):
@@ -89,7 +86,6 @@ class Engine(World, Protocol):
 
     spec: RobotSpec
     time_step: float
-    window: Window | None
 
     def place(self, position: Vector, q: Array) -> None:
         """Put the upright robot with its base origin at `position` (m) and the joints at `q`, all at rest.
@@ -133,6 +129,10 @@ class Engine(World, Protocol):
         Raises:
             RobotError: for a site that the spec does not have.
         """
+        ...
+
+    def payload_position(self) -> Vector | None:
+        """Where the payload's centre is now (m, world axes), held or falling; None without one."""
         ...
 
     def ground_forces(self) -> Array:

@@ -14,26 +14,21 @@ if TYPE_CHECKING:
 EngineName = Literal["bullet", "mujoco"]
 
 
-def make_engine(
-    name: EngineName, spec: RobotSpec, time_step: float, *, renders: bool = False, window: bool = False
-) -> Engine:
+def make_engine(name: EngineName, spec: RobotSpec, time_step: float, *, renders: bool = False) -> Engine:
     """Build `spec` in the engine called `name`.
 
     Args:
         time_step: of the physics (s).
         renders: whether pictures will be asked for: an engine that cannot draw on this machine then says so at once.
-        window: whether it shows itself in a window.
 
     Raises:
-        OptionError: for an unknown engine, one that is not installed, one that cannot draw, or has no window.
+        OptionError: for an unknown engine, one that is not installed, or one that cannot draw.
         RobotError: for a robot that the engine cannot simulate.
     """
     if name == "bullet":
         from artde_gym.sim.bullet import BulletEngine  # imported only when used
 
-        return BulletEngine(spec, time_step, window=window)
-    if window:
-        raise OptionError("engine of a window", name, "'bullet'")
+        return BulletEngine(spec, time_step)
     if name == "mujoco":
         try:
             from artde_gym.sim.mujoco import MujocoEngine

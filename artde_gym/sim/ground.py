@@ -47,7 +47,7 @@ class Shadow:
         self._link = [number for number, _ in boxes]
         self._corners = np.array([np.add(box.center, _CORNERS * box.size) for _, box in boxes]).reshape(-1, 8, 3)
 
-    def polygons(self, state: State, ball: Array | None) -> list[Array]:
+    def polygons(self, state: State, ball: Vector | None) -> list[Array]:
         """Corners (n, 3) (m) on the ground of polygons that overlap; the payload is at `ball` (m), if anywhere."""
         q = np.zeros(self._tree.n)  # joints that nobody actuates are held at zero
         q[self._joints] = state.q
@@ -58,7 +58,7 @@ class Shadow:
         if ball is not None and ball[2] > 0:
             across, over = _beside(SUN)
             edge = PAYLOAD_LOOK * (np.cos(_ROUND)[:, None] * across + np.sin(_ROUND)[:, None] * over)
-            found.append(_cast(ball + edge))
+            found.append(_cast(np.asarray(ball) + edge))
         return found
 
 

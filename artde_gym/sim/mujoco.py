@@ -10,7 +10,7 @@ fall is the formula of free fall.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -24,9 +24,6 @@ from artde_gym.sim.ground import Shadow, paint
 from artde_gym.sim.mujoco_canvas import Canvas
 from artde_gym.sim.mujoco_world import STATE, Blueprint, Fields, MujocoWorld
 from artde_gym.sim.rotation import Quaternion, moved, rotated
-
-if TYPE_CHECKING:  # it is the other engine's
-    from artde_gym.sim.window import Window
 
 mj: Any = mujoco  # compiled, without type information
 
@@ -48,7 +45,6 @@ class MujocoEngine(MujocoWorld):
 
     def __init__(self, spec: RobotSpec, time_step: float = 0.001, *, renders: bool = False) -> None:
         blueprint = Blueprint(spec, time_step)
-        self.window: Window | None = None
         self.time_step = time_step
         self._model = model = blueprint.model
         self._data = data = mj.MjData(model)
@@ -135,22 +131,23 @@ class MujocoEngine(MujocoWorld):
         super().release_payload()
         self._fall = None
 
-    def _payload_center(self) -> Array | None:
-        """Where the payload is, held or falling."""
+    def payload_position(self) -> Vector | None:
         if self.held is not None:
             state = self.read()
-            return np.add(state.position, rotated(self.held, state.quat_xyzw))
+            (x, y, z), (ax, ay, az) = state.position, rotated(self.held, state.quat_xyzw)
+            return x + ax, y + ay, z + az
         if self._fall is not None:
             position, velocity, start = self._fall
             time = self._data.time - start
-            return position + velocity * time + self._model.opt.gravity * (time * time / 2)
+            x, y, z = (position + velocity * time + self._model.opt.gravity * (time * time / 2)).tolist()
+            return x, y, z
         return None
 
     def render(self, camera: Camera) -> NDArray[np.uint8]:
         if self._canvas is None:
             self._canvas = Canvas(self._model)
         mj.mj_camlight(self._model, self.placed())
-        ball = self._payload_center()
+        ball = self.payload_position()
         picture, bare = self._canvas.draw(self._data, camera, ball)
         paint(picture, bare, camera, self._shadow.polygons(self.read(), ball))
         return picture

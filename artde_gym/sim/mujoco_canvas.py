@@ -16,8 +16,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from artde_gym.arrays import Array
 from artde_gym.errors import OptionError
+from artde_gym.robots.spec import Vector
 from artde_gym.sim.camera import Camera
 from artde_gym.sim.engine import PAYLOAD_COLOUR, PAYLOAD_LOOK
 
@@ -48,7 +48,7 @@ class Canvas:
         self._finalizer.atexit = False  # too late: EGL's display is closed by then
         atexit.register(self._finalizer)
 
-    def draw(self, data: Any, camera: Camera, ball: Array | None) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+    def draw(self, data: Any, camera: Camera, ball: Vector | None) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
         """A picture, (height, width, 3), with the payload's ball at `ball` (m), if there is one; where it is bare."""
         scene, rect = self._scene, mj.MjrRect(0, 0, camera.width, camera.height)
         eye = mj.MjvCamera()
@@ -59,7 +59,7 @@ class Canvas:
         if ball is not None and ball[2] > -PAYLOAD_LOOK:  # the ground, which would hide it, is not drawn
             size, colour = np.full(3, PAYLOAD_LOOK), np.array(PAYLOAD_COLOUR, dtype=np.float32)
             shape = mj.mjtGeom.mjGEOM_SPHERE
-            mj.mjv_initGeom(scene.geoms[scene.ngeom], shape, size, ball, np.eye(3).ravel(), colour)
+            mj.mjv_initGeom(scene.geoms[scene.ngeom], shape, size, np.array(ball), np.eye(3).ravel(), colour)
             scene.ngeom += 1
         picture = np.empty((camera.height, camera.width, 3), dtype=np.uint8)
         depth = np.empty((camera.height, camera.width), dtype=np.float32)

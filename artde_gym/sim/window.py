@@ -1,25 +1,34 @@
-"""A window of Bullet's own onto a world that is being simulated: what it shows, and what a person does in it."""
+"""A window of Bullet's own: it shows a robot that is simulated elsewhere, and says what a person does in it."""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
+import tempfile
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pybullet_data
 
 from artde_gym.errors import OptionError
-from artde_gym.robots.spec import Vector
+from artde_gym.robots.spec import RobotSpec, Vector
+from artde_gym.robots.urdf import urdf
 from artde_gym.sim.camera import Camera
+from artde_gym.sim.engine import PAYLOAD_COLOUR, PAYLOAD_LOOK, State
+from artde_gym.sim.ground import SUN
 from artde_gym.sim.quiet import bullet
+from artde_gym.sim.rotation import rotated
 
 PATIENCE = 60.0  # s, for a first window to open
 NEAR_CLICK = 60.0  # pixels, that a click may be off what it is meant for
 INK, RED = (0.1, 0.12, 0.14), (0.77, 0.09, 0.24)
 ABOVE = 0.7  # m, of the words above what the camera looks at
+LIGHT = 3.0  # of the sun's vector, to the lamp
 LASTING = 0.4  # s, that an arrow stays
+_AWAY: Vector = (0.0, 0.0, -10.0)  # under the ground
 _LINE = 0.09  # m, from one line of words to the next
 
 _KEYS = {
@@ -39,34 +48,83 @@ def require_window() -> None:
     Raises:
         OptionError: without a display, or without OpenGL on it.
     """
-    if not os.environ.get("DISPLAY"):
-        raise OptionError("window", True, "False without a display (DISPLAY is not set); `artde-gym video` needs none")
+    where = os.environ.get("DISPLAY")
+    if not where:
+        raise OptionError(
+            "display", None, "one that shows OpenGL 3 (DISPLAY is not set here); `artde-gym video` needs none"
+        )
     try:
         done = subprocess.run([sys.executable, "-c", _PROBE], capture_output=True, text=True, timeout=PATIENCE)
     except subprocess.TimeoutExpired as error:
-        raise OptionError("window", True, f"False: no window opened within {PATIENCE:g} s") from error
+        raise OptionError("display", where, f"one on which a window opens within {PATIENCE:g} s") from error
     if done.returncode:
         said = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
         why = said[-1].strip() if said else f"exit code {done.returncode}"
-        where = os.environ["DISPLAY"]
-        raise OptionError("window", True, f"False: display {where!r} shows no OpenGL 3 ({why}); `artde-gym video` can")
+        raise OptionError("display", where, f"one that shows OpenGL 3 (here: {why}); `artde-gym video` needs none")
 
 
 class Window:
-    """The window of one client of Bullet."""
+    """A window onto the world of an engine, whichever it is: it shows what `show` says, and simulates nothing.
 
-    def __init__(self, client: int) -> None:
-        self._client: dict[str, Any] = {"physicsClientId": client}
+    Args:
+        spec: of the robot.
+
+    Raises:
+        OptionError: without a display, or without OpenGL on it.
+    """
+
+    def __init__(self, spec: RobotSpec) -> None:
+        require_window()
+        self._spec = spec
+        number = bullet.connect(bullet.GUI)
+        self._client: dict[str, Any] = {"physicsClientId": number}
         self._words: list[int] = []
-        for flag in (bullet.COV_ENABLE_GUI, bullet.COV_ENABLE_KEYBOARD_SHORTCUTS, bullet.COV_ENABLE_MOUSE_PICKING):
+        hidden = (
+            bullet.COV_ENABLE_GUI,
+            bullet.COV_ENABLE_KEYBOARD_SHORTCUTS,
+            bullet.COV_ENABLE_MOUSE_PICKING,
+            bullet.COV_ENABLE_RENDERING,
+        )
+        for flag in hidden:
             bullet.configureDebugVisualizer(flag, 0, **self._client)
+        data = Path(pybullet_data.getDataPath())
+        ground = self._body(bullet.GEOM_MESH, fileName=str(data / "plane100.obj"))
+        checks = bullet.loadTexture(str(data / "checker_blue.png"), **self._client)
+        bullet.changeVisualShape(ground, -1, textureUniqueId=checks, specularColor=[0.0] * 3, **self._client)
+        self._payload = self._body(bullet.GEOM_SPHERE, radius=PAYLOAD_LOOK, rgbaColor=PAYLOAD_COLOUR)
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "robot.urdf"
+            file.write_text(urdf(spec), encoding="utf-8")
+            self._robot = bullet.loadURDF(str(file), flags=bullet.URDF_USE_INERTIA_FROM_FILE, **self._client)
+        joints = range(bullet.getNumJoints(self._robot, **self._client))
+        links = {bullet.getJointInfo(self._robot, i, **self._client)[12].decode(): i for i in joints}
+        self._joints = [links[name] for name in spec.actuated]
+        light = [LIGHT * part for part in SUN]
+        bullet.configureDebugVisualizer(bullet.COV_ENABLE_RENDERING, 1, lightPosition=light, **self._client)
+
+    def _body(self, kind: int, **shape: Any) -> int:
+        return bullet.createMultiBody(0.0, -1, bullet.createVisualShape(kind, **shape, **self._client), **self._client)
+
+    def show(self, state: State, payload: Vector | None) -> None:
+        """The robot as it is, and the centre of its payload (m), if it has one."""
+        center = np.add(state.position, rotated(self._spec.base.com, state.quat_xyzw)).tolist()
+        bullet.resetBasePositionAndOrientation(self._robot, center, state.quat_xyzw, **self._client)
+        if self._joints:
+            angles = [[angle] for angle in state.q.tolist()]
+            bullet.resetJointStatesMultiDof(self._robot, self._joints, angles, **self._client)
+        bullet.resetBasePositionAndOrientation(self._payload, payload or _AWAY, (0.0, 0.0, 0.0, 1.0), **self._client)
+
+    def close(self) -> None:
+        """Close it; safe to call twice, and after a person closed it."""
+        if self.open:
+            bullet.disconnect(**self._client)
 
     @property
     def open(self) -> bool:
         """Whether it is still there."""
         return bool(bullet.isConnected(**self._client))
 
-    def keys(self) -> list[str]:
+    def pressed(self) -> list[str]:
         """Keys that were pressed since this was last asked: "left", "right", "up", "down", "space", or a character."""
         pressed = [
             key for key, state in bullet.getKeyboardEvents(**self._client).items() if state & bullet.KEY_WAS_TRIGGERED

@@ -248,7 +248,7 @@ def test_render_shows_the_vehicle_and_follows_it_half_way() -> None:
         return np.array([columns.mean(), rows.mean()])
 
     middle, moved = seen([0.0, 0.0, 0.0]), seen([0.3, 0.0, 0.0])
-    camera = env.unwrapped.view.camera((0.0, 0.0, 0.6))
+    camera = env.unwrapped.view.following((0.0, 0.0, 0.6))
     x, y, z = START
     right = camera.pixels([(x + 0.3, y, z)]) - camera.pixels([(x, y, z)])
     np.testing.assert_allclose(moved - middle, right[0] / 2, atol=8)
