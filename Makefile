@@ -6,7 +6,7 @@ INSTALL := $(BIN)/python -m pip install --disable-pip-version-check --quiet --co
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help evaluate test check format benchmark clean
+.PHONY: help evaluate test check format benchmark docs clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*  ## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -30,8 +30,12 @@ format: .venv/dev  ## format and mend what can be mended
 benchmark: .venv/core  ## speed, as ratios in one run
 	$(BIN)/python scripts/benchmark.py $(ARGS)
 
+docs: .venv/docs  ## build the documentation into site/, warnings are errors (to be read in a browser, also without a server)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo "artde-gym: open site/index.html"
+
 clean:  ## remove the environment and all caches, keep runs
-	rm -rf .venv build dist .hypothesis .import_linter_cache .pytest_cache .ruff_cache *.egg-info
+	rm -rf .venv build dist site .hypothesis .import_linter_cache .pytest_cache .ruff_cache *.egg-info
 	find artde_gym baselines controllers scripts tests -name __pycache__ -exec rm -rf {} +
 
 .venv/core: pyproject.toml constraints.txt scripts/build_backend.py
@@ -43,7 +47,12 @@ clean:  ## remove the environment and all caches, keep runs
 	@$(INSTALL) --editable .
 	@touch $@
 
+.venv/docs: .venv/core
+	@echo "artde-gym: installing the extra docs into .venv"
+	@$(INSTALL) --editable '.[docs]'
+	@touch $@
+
 .venv/dev: .venv/core
-	@echo "artde-gym: installing the extras dev, mujoco and rl into .venv"
-	@$(INSTALL) --editable '.[dev,mujoco,rl]'
+	@echo "artde-gym: installing the extras dev, docs, mujoco, rl and video into .venv"
+	@$(INSTALL) --editable '.[dev,docs,mujoco,rl,video]'
 	@touch $@

@@ -41,6 +41,10 @@ class StoreError(ArtdeGymError):
     """A results folder that cannot be written or read."""
 
 
+class WorkerError(ArtdeGymError):
+    """Worker processes that end before their work is done."""
+
+
 def among(name: object, known: Collection[str]) -> str:
     """The known names as a sentence, the likely meant one pointed out."""
     close = difflib.get_close_matches(str(name), known, n=1)

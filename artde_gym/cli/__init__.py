@@ -9,7 +9,7 @@ import gymnasium as gym
 import typer
 
 from artde_gym import __version__
-from artde_gym.cli import evaluate, frontier, listing, report, reproduce, train, tune
+from artde_gym.cli import evaluate, frontier, listing, play, report, reproduce, sweep, train, tune, video
 from artde_gym.errors import ArtdeGymError
 from controllers import GainError
 
@@ -22,9 +22,12 @@ app = typer.Typer(
 app.command()(evaluate.evaluate)
 app.command()(frontier.frontier)
 app.command()(tune.tune)
+app.command()(sweep.sweep)
 app.command()(reproduce.reproduce)
 app.command()(train.train)
 app.command()(report.report)
+app.command()(video.video)
+app.command()(play.play)
 app.command("list")(listing.list_everything)
 
 

@@ -20,13 +20,17 @@ Seed = Annotated[int, typer.Option(help="Seed of everything.")]
 Workers = Annotated[int | None, typer.Option(help="Processes. Default: all cores.")]
 Out = Annotated[Path | None, typer.Option(help="Results folder. Default: runs/<date and time>.")]
 Backend = Annotated[
-    str, typer.Option(help="single: an engine for each episode; batch: thousands at once, where there is a vector.")
+    str, typer.Option(help="single: one environment after the other; batch: many at once (of the biped, in MuJoCo).")
 ]
 Engine = Annotated[str | None, typer.Option(help=f"Physics engine: {' or '.join(ENGINES)}.")]
 Disturbances = Annotated[str | None, typer.Option(help="JSON, in place of those that belong to what is run.")]
 EnvKwargs = Annotated[str | None, typer.Option(help="JSON, arguments of the environment.")]
 Gains = Annotated[str | None, typer.Option(help='JSON, e.g. {"artde": {"gamma_0": 200}}.')]
 Report = Annotated[bool, typer.Option("--report", help="Write report.html, too.")]
+Pictures = Annotated[
+    bool, typer.Option("--pictures", help="Report with pictures of the motion, pushes and falls; runs them once more.")
+]
+Videos = Annotated[bool, typer.Option("--videos", help="Report with a video of each scenario (needs ffmpeg).")]
 
 
 def names(text: str) -> list[str]:

@@ -16,8 +16,10 @@ from artde_gym.cli.arguments import (
     EnvKwargs,
     Gains,
     Out,
+    Pictures,
     Report,
     Seed,
+    Videos,
     Workers,
     environment_kwargs,
     folder_of,
@@ -58,6 +60,8 @@ def evaluate(
     ] = None,
     trace_hz: Annotated[float, typer.Option(help="Rate of stored signals; inf for all of them.")] = 100.0,
     report: Report = False,
+    pictures: Pictures = False,
+    videos: Videos = False,
 ) -> None:
     """Compare controllers on the same seeded episodes and print them beside the thesis."""
     if scenario is None:
@@ -86,7 +90,7 @@ def evaluate(
             on_progress=display,
         )
     print_result(result, console)
-    if report:
-        show_report(folder, console)
+    if report or pictures or videos:
+        show_report(folder, console, pictures=pictures, videos=videos)
     if not result.complete:
         raise typer.Exit(130)

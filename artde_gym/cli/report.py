@@ -8,16 +8,22 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from artde_gym.cli.arguments import Pictures, Videos
+
 
 def report(
-    folder: Annotated[Path, typer.Argument(help="Results folder of `evaluate`, `reproduce` or `frontier`.")],
+    folder: Annotated[Path, typer.Argument(help="Results folder of `evaluate`, `reproduce`, `frontier` or `train`.")],
+    pictures: Pictures = False,
+    videos: Videos = False,
 ) -> None:
     """Write report.html into a results folder, finished or not: one file that needs no network."""
-    show_report(folder, Console())
+    show_report(folder, Console(), pictures=pictures, videos=videos)
 
 
-def show_report(folder: Path, console: Console) -> None:
+def show_report(folder: Path, console: Console, *, pictures: bool = False, videos: bool = False) -> None:
     """Write the report of a folder and say where it is."""
     from artde_gym.evaluation.report import write_report  # only when asked for
 
-    console.print(f"Report: {write_report(folder)}", soft_wrap=True)
+    with console.status("Report") as status:
+        file = write_report(folder, pictures=pictures, videos=videos, on_progress=status.update)
+    console.print(f"Report: {file}", soft_wrap=True)

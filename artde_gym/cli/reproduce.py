@@ -9,7 +9,7 @@ import pandas as pd
 import typer
 from rich.console import Console
 
-from artde_gym.cli.arguments import ENGINES, Report, Seed, Workers, names, processes
+from artde_gym.cli.arguments import ENGINES, Pictures, Report, Seed, Videos, Workers, names, processes
 from artde_gym.cli.display import Display
 from artde_gym.cli.report import show_report
 from artde_gym.evaluation import reproduce as run_reproduction
@@ -33,6 +33,8 @@ def reproduce(
         Path, typer.Option(help="Results folder, one inside for each engine and robot; the same call continues it.")
     ] = Path("runs/reproduce"),
     report: Report = False,
+    pictures: Pictures = False,
+    videos: Videos = False,
 ) -> None:
     """Run the thesis' scenarios and print its tables beside ours, then each of its claims with a verdict."""
     robots = list(ROBOTS) if robot == "all" else [robot]
@@ -63,8 +65,8 @@ def reproduce(
             print_result(found.result, console)
             print_claims(found.claims, console)
             verdicts[one] = found.claims
-            if report and found.result.folder is not None:
-                show_report(found.result.folder, console)
+            if (report or pictures or videos) and found.result.folder is not None:
+                show_report(found.result.folder, console, pictures=pictures, videos=videos)
             if not found.result.complete:
                 raise typer.Exit(130)
         if len(engines) > 1:

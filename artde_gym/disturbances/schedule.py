@@ -34,12 +34,12 @@ class Schedule:
     """The timed disturbances of one episode, in physics steps of `time_step` (s)."""
 
     def __init__(self, realised: Mapping[str, Any], time_step: float) -> None:
+        self._time_step = time_step
         self._pushes = [Push.of(entry, time_step) for entry in realised.get("push", ())]
         self._payload: Mapping[str, Any] = realised.get("payload", {})
         self._changes: dict[int, list[str]] = {}
         for number, push in enumerate(self._pushes):
-            self._add(push.first, f"push {number} begins")
-            self._add(push.end, f"push {number} ends")
+            self._announce(number, push)
         if self._payload and self._payload["drop"] > self._payload["attach"]:
             if self._payload["attach"] > 0:
                 self._add(round(self._payload["attach"] / time_step), "payload attached")
@@ -50,15 +50,34 @@ class Schedule:
         if self._payload.get("attach") == 0 and self._payload["drop"] > 0:
             self._attach(world)
 
+    def add(self, push: Push) -> None:
+        """One more push than was drawn."""
+        self._announce(len(self._pushes), push)
+        self._pushes.append(push)
+
+    def drop(self, step: int) -> bool:
+        """Drop the payload at a step instead of later; False if it is not there then."""
+        time = step * self._time_step
+        if not self._payload or not self._payload["attach"] <= time < self._payload["drop"]:
+            return False
+        self._changes[round(self._payload["drop"] / self._time_step)].remove("payload dropped")
+        self._payload = {**self._payload, "drop": time}
+        self._add(step, "payload dropped")
+        return True
+
     def quiet(self, first: int, end: int) -> bool:
         """Whether nothing acts, begins or ends from step `first` up to, not including, `end`."""
         return not self._changes or self.next(first) >= end
 
     def next(self, step: int) -> int:
         """The first step from `step` on in which something acts, begins or ends; `NEVER` if there is none."""
-        if any(push.first <= step < push.end for push in self._pushes):
+        if self.acting(step):
             return step
         return min((change for change in self._changes if change >= step), default=NEVER)  # every push begins and ends
+
+    def acting(self, step: int) -> list[Push]:
+        """The pushes that act during a step."""
+        return [push for push in self._pushes if push.first <= step < push.end]
 
     def apply(self, step: int, world: World) -> list[str]:
         """Bring about what belongs to a step; returns what begins or ends with it, in words."""
@@ -68,14 +87,17 @@ class Schedule:
                 self._attach(world)
             elif event == "payload dropped":
                 world.release_payload()
-        for push in self._pushes:
-            if push.first <= step < push.end:
-                world.push(push.site, push.force)
+        for push in self.acting(step):
+            world.push(push.site, push.force)
         return events
 
     def _attach(self, world: World) -> None:
         x, y, z = self._payload["position"]
         world.attach_payload(self._payload["mass"], (x, y, z))
+
+    def _announce(self, number: int, push: Push) -> None:
+        self._add(push.first, f"push {number} begins")
+        self._add(push.end, f"push {number} ends")
 
     def _add(self, step: int, event: str) -> None:
         self._changes.setdefault(step, []).append(event)

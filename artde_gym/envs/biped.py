@@ -13,10 +13,13 @@ from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
 from artde_gym.disturbances.ground import LOADED
+from artde_gym.disturbances.schedule import Schedule
 from artde_gym.envs import biped_task as task
 from artde_gym.envs.biped_course import Course
 from artde_gym.envs.documentation import filled
+from artde_gym.envs.live import Live
 from artde_gym.envs.options import disturbances_in
+from artde_gym.envs.view import View
 from artde_gym.errors import ActionError, OptionError
 from artde_gym.robots import ojas as robot
 from artde_gym.robots.ojas import ActuatorInertia
@@ -24,10 +27,17 @@ from artde_gym.sim.engine import Camera, Engine
 from artde_gym.sim.factory import EngineName, make_engine
 from artde_gym.sim.rotation import arcsine, roll_pitch
 
+CAMERA_HEIGHT = 0.42  # m, of what it looks at
+LEEWAY = 0.15  # m, that the robot may be off its pattern before the camera goes with it
+
 _PAGE = (
     task.DOCUMENTATION
     + """
 | `engine` | "bullet" | "bullet", "mujoco" | physics engine; see docs/engines.md |
+| `width`, `height` | 640, 480 | 16 to 4096 | pixels of a picture |
+
+With `render_mode="rgb_array"`, `render` draws 30 pictures a simulated second; asked more often, it gives the last one
+again. Words of your own in `env.unwrapped.view.caption` are written into each of them.
 
 `reset(options={{"disturbances": ..., "scenario": "S2"}})` replaces the disturbances of this and the following
 episodes, by a mapping or by those of a named scenario.
@@ -38,7 +48,7 @@ the grammar writes them); `events` when a push or a payload begins or ends; afte
 )
 
 
-class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
+class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
     """What all tasks of Ojas share; a subclass says what disturbs the walk by default.
 
     Args:
@@ -50,6 +60,7 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         speed: see `artde_gym.references.walking`, also for `step_duration` and `duration`.
         observe_ground_force: whether the observation ends with the ground's force on each foot.
         engine: physics engine.
+        width, height: of pictures (pixels).
         render_mode: "rgb_array" or None.
 
     Raises:
@@ -77,6 +88,8 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         duration: float = 58.0,
         observe_ground_force: bool = False,
         engine: EngineName = "bullet",
+        width: int = 640,
+        height: int = 480,
         render_mode: Literal["rgb_array"] | None = None,
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
@@ -88,6 +101,9 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         self.nominal_robot, self.pattern, self.control_period = walk.nominal_robot, walk.pattern, walk.control_period
         self._disturbances = walk.parse(self.default_disturbances if disturbances is None else disturbances)
         self._engine: Engine = make_engine(engine, walk.robot, task.TIME_STEP, renders=render_mode is not None)
+        camera = Camera((0.0, 0.0, CAMERA_HEIGHT), width=width, height=height)
+        self.view = View(self._engine, camera, self.control_period, share=1.0, slack=LEEWAY)
+        self.metadata = {**self.metadata, **self.view.metadata}
         self.observe_ground_force = observe_ground_force
         self.observation_layout = task.observation_layout(observe_ground_force)
         self.observation_space = self.observation_layout.box()
@@ -98,6 +114,8 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         self._still = self._settle(walk.start, task.SETTLE_STEPS)
         self._settled = self._engine.snapshot()
         self._k = walk.last  # no step before the first reset
+        self._state, self._realised = self._engine.read(), {}
+        self._course = Course(self._realised, walk, self.np_random)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
         """Start a walk; `options` are those of the class' documentation.
@@ -112,7 +130,9 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
             self._disturbances = self._walk.parse(disturbances)
         realised = self._disturbances.draw(self.np_random)
         self._k = 0
+        self._realised = realised
         self._tau = self._begin(realised)
+        self.view.reset()
         info: dict[str, Any] = {"time_s": 0.0, "disturbances": realised}
         return self._measure(info), info
 
@@ -146,14 +166,25 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         return observation, reward, fell, self._k >= self._walk.last, info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """A picture of 640 x 480 from a camera that walks along; None without a render mode."""
+        """A picture from a camera that walks along; None without a render mode."""
         if self.render_mode is None:
             return None
-        x, y, _ = self._engine.read().position
-        return self._engine.render(Camera((x, y, 0.42)))
+        step = self.elapsed
+        home = (float(self.pattern.base[step, 0]), 0.0, CAMERA_HEIGHT)
+        pushes = self.schedule.acting(step)
+        over = self._k >= self._walk.last or any(self._falls())
+        return self.view.picture(step * task.TIME_STEP, home, pushes, self._realised, over=over)
 
     def close(self) -> None:
         self._engine.close()
+
+    @property
+    def elapsed(self) -> int:
+        return self._k * self._walk.substeps
+
+    @property
+    def schedule(self) -> Schedule:
+        return self._course.schedule
 
     def _begin(self, realised: Mapping[str, Any]) -> Array:
         """Set an episode up and let the robot come to rest in it; returns the joint torques in the end."""
@@ -179,7 +210,7 @@ class BipedEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         """Let `command` act for one control period, with what disturbs it; returns what began or ended meanwhile."""
         engine, course = self._engine, self._course
         events: list[str] = []
-        first = self._k * self._walk.substeps
+        first = self.elapsed
         course.begin(command)
         for step in range(first, first + self._walk.substeps):
             engine.step(course.act(step, engine, events))

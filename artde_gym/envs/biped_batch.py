@@ -107,7 +107,7 @@ class BipedVectorEnv(BatchEnv):
         self._last = walk.last
         self._disturbances = self._parse(self.default_disturbances if disturbances is None else disturbances)
         self._batch = make_batch(engine, walk.robot, num_envs, task.TIME_STEP, threads)
-        self._courses: list[Course | None] = [None] * num_envs
+        self._courses: dict[int, Course] = {}
         self._wakes = np.full(num_envs, NEVER)  # time step of each walk in which its course is to be asked again
         self._sensing: dict[int, Sensing] = {}  # where sensors err
         self._readings: dict[int, Array] = {}  # what they measured last
@@ -141,7 +141,7 @@ class BipedVectorEnv(BatchEnv):
             poses = np.array([walk.pose(drawn[i]) for i in some])
             self._tau[some] = self._settle(np.array(some, np.int32), poses, steps)
         for i in drawn:
-            self._course(i).settled(self._tau[i].copy())
+            self._courses[i].settled(self._tau[i].copy())
 
     def _settle(self, some: NDArray[np.int32], poses: Array, steps: int) -> Array:
         """Let some robots stand still in `poses` (n, 12) (rad) for so many time steps; returns their last torques."""
@@ -152,42 +152,44 @@ class BipedVectorEnv(BatchEnv):
         return np.clip(tau, -robot.TORQUE_LIMIT, robot.TORQUE_LIMIT)
 
     def _advance(self, commands: Array, goes_on: Mask) -> dict[int, list[str]]:
-        everybody = None if goes_on.all() else np.flatnonzero(goes_on).astype(np.int32)
-        if everybody is not None:
+        if not goes_on.all():
             np.copyto(commands, self._tau, where=~goes_on[:, None])
         self._previous, self._tau = self._tau, commands
-        batch, steps = self._batch, self._walk.substeps
-        first = self._k * steps
-        events: dict[int, list[str]] = {}
-        awake = (self._wakes < first + steps) & goes_on
+        steps = self._walk.substeps
+        awake = goes_on & (self._wakes < (self._k + 1) * steps)
         if not awake.any():
-            batch.step(commands if everybody is None else commands[everybody], everybody, steps)
-            return events
-        busy = np.flatnonzero(awake).astype(np.int32)
-        torques = commands.copy()
-        together = everybody if steps == 1 else busy
-        for i in busy.tolist():
-            self._course(i).begin(commands[i].copy())
-        for step in range(steps):
-            for i in busy.tolist():
-                told: list[str] = []
-                torques[i] = self._course(i).act(int(first[i]) + step, batch.worlds[i], told)
-                if told:
-                    events.setdefault(i, []).extend(told)
-            batch.step(torques if together is None else torques[together], together)
+            self._step(commands, goes_on, steps)
+            return {}
         if steps > 1:
-            quiet = np.flatnonzero(goes_on & ~awake).astype(np.int32)
-            batch.step(commands[quiet], quiet, steps)
-        for i in busy.tolist():
-            course = self._course(i)
-            commands[i] = course.applied()
-            self._wakes[i] = course.wakes(int(first[i]) + steps)
-        return events
+            self._step(commands, goes_on & ~awake, steps)
+        return self._disturbed(commands, awake, goes_on if steps == 1 else awake)
 
-    def _course(self, i: int) -> Course:
-        course = self._courses[i]
-        assert course is not None
-        return course
+    def _disturbed(self, commands: Array, awake: Mask, some: Mask) -> dict[int, list[str]]:
+        """Advance `some` robots by a control period in which something happens to those that are `awake`.
+
+        What acts on these takes the place of what was commanded. Returns events.
+        """
+        steps, torques = self._walk.substeps, commands.copy()
+        happening = [(i, self._courses[i], int(self._k[i]) * steps) for i in np.flatnonzero(awake).tolist()]
+        events: dict[int, list[str]] = {i: [] for i, _, _ in happening}
+        for i, course, _ in happening:
+            course.begin(commands[i].copy())
+        for step in range(steps):
+            for i, course, first in happening:
+                torques[i] = course.act(first + step, self._batch.worlds[i], events[i])
+            self._step(torques, some, 1)
+        for i, course, first in happening:
+            commands[i] = course.applied()
+            self._wakes[i] = course.wakes(first + steps)
+        return {i: words for i, words in events.items() if words}
+
+    def _step(self, torques: Array, some: Mask, steps: int) -> None:
+        """Advance some robots by so many time steps under their rows of `torques`."""
+        if some.all():
+            self._batch.step(torques, steps=steps)
+        else:
+            worlds = np.flatnonzero(some).astype(np.int32)
+            self._batch.step(torques[worlds], worlds, steps)
 
     def _truth(self) -> Array:
         state = self._state = self._batch.read()

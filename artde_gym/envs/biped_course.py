@@ -27,12 +27,13 @@ class Course:
         rng: of the environment.
 
     Attributes:
+        schedule: of pushes and the payload.
         sensing: of observations; None without any.
     """
 
     def __init__(self, realised: Mapping[str, Any], walk: Walk, rng: np.random.Generator) -> None:
         kinds = realised.keys()
-        self._schedule = Schedule(realised, TIME_STEP)
+        self.schedule = Schedule(realised, TIME_STEP)
         self._pulse = GrfPulse(realised["grf_pulse"], TIME_STEP) if "grf_pulse" in kinds else None
         joints = walk.nominal_robot.actuated
         self._actuation = None if kinds.isdisjoint(Actuation.KINDS) else Actuation(realised, joints, TIME_STEP)
@@ -44,7 +45,7 @@ class Course:
 
     def start(self, world: World) -> None:
         """Bring about what is there while the robot settles."""
-        self._schedule.start(world)
+        self.schedule.start(world)
 
     def settled(self, tau: Array) -> None:
         """The walk begins, with torques `tau` (n,) (Nm)."""
@@ -53,7 +54,7 @@ class Course:
 
     def wakes(self, step: int) -> int:
         """The first time step from `step` on in which commanded torques are not all that happens."""
-        return step if self._actuation is not None or self._pulse is not None else self._schedule.next(step)
+        return step if self._actuation is not None or self._pulse is not None else self.schedule.next(step)
 
     def begin(self, command: Array) -> None:
         """A control period begins with torques `command` (n,) (Nm) within their bounds."""
@@ -62,7 +63,7 @@ class Course:
 
     def act(self, step: int, world: World, events: list[str]) -> Array:
         """Disturb a world for a time step; returns the torques (n,) (Nm) that act, and adds to `events`."""
-        events += self._schedule.apply(step, world)
+        events += self.schedule.apply(step, world)
         if self._pulse is not None:
             for site, force in zip(FOOT_SITES, self._pulse.forces(world.foot_loads()), strict=True):
                 if force:

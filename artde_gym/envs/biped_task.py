@@ -97,8 +97,8 @@ Number = TypeVar("Number", float, Array)
 
 DOCUMENTATION = """\
 ## Action
-`Box(-40, 40, (12,), float64)`, joint torques in Nm, left leg then right leg, each q1..q6 = hip yaw, hip roll, hip
-pitch, knee, ankle pitch, ankle roll. Held for one control period; clipped to the bounds. Use Gymnasium's
+`tau`, `Box(-40, 40, (12,), float64)`: joint torques in Nm, left leg then right leg, each q1..q6 = hip yaw, hip roll,
+hip pitch, knee, ankle pitch, ankle roll. Held for one control period; clipped to the bounds. Use Gymnasium's
 `RescaleAction` for [-1, 1].
 
 ## Observation

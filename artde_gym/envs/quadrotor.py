@@ -19,8 +19,10 @@ from artde_gym.disturbances.schedule import Schedule
 from artde_gym.disturbances.wind import GRID, Wind
 from artde_gym.envs import quadrotor_task as task
 from artde_gym.envs.documentation import filled
+from artde_gym.envs.live import Live
 from artde_gym.envs.options import disturbances_in, steps_per_period
 from artde_gym.envs.quadrotor_sensors import Measurement, Sensors
+from artde_gym.envs.view import View
 from artde_gym.errors import ActionError, OptionError
 from artde_gym.references.infinity import START
 from artde_gym.robots import q450 as robot
@@ -32,12 +34,16 @@ from artde_gym.sim.rotation import matrix
 TIME_STEP = 0.001  # s, of the physics
 STEPS = 5  # physics steps from one grid point to the next
 
+CENTRE: Vector = (0.0, 0.0, 0.6)  # m, of the path
+CAMERA = Camera(CENTRE, distance=3.0, yaw_deg=35.0, pitch_deg=24.0)
+SHARE, LEEWAY = 0.5, 0.6  # of the vehicle's way from the centre; m, that it may be off the picture's middle
+
 _NOTHING = (0.0, 0.0, 0.0)
 _NO_JOINTS = np.zeros(0)
 
 
 @filled(shared=task.DOCUMENTATION)
-class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
+class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
     """A quadrotor flies an infinity-shaped path with a payload, drops it half-way, and flies the path once more.
 
     ## Description
@@ -47,6 +53,10 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
 
     {shared}
     | `engine` | "bullet" | "bullet", "mujoco" | physics engine; see docs/engines.md |
+    | `width`, `height` | 640, 480 | 16 to 4096 | pixels of a picture |
+
+    With `render_mode="rgb_array"`, `render` draws 30 pictures a simulated second; asked more often, it gives the last
+    one again. Words of your own in `env.unwrapped.view.caption` are written into each of them.
 
     `reset(options={{"disturbances": ..., "scenario": "Q1"}})` replaces the disturbances of this and the following
     episodes, by a mapping or by those of a named scenario.
@@ -78,6 +88,8 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         measurement: Measurement = "ideal",
         duration: float = 70.0,
         engine: EngineName = "bullet",
+        width: int = 640,
+        height: int = 480,
         render_mode: Literal["rgb_array"] | None = None,
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
@@ -96,9 +108,12 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         self.action_space = task.ACTION.box()
         self._low, self._high = self.action_space.low, self.action_space.high
         self._engine: Engine = make_engine(engine, self.nominal_robot, TIME_STEP, renders=render_mode is not None)
+        self.view = View(self._engine, CAMERA._replace(width=width, height=height), self.control_period, SHARE, LEEWAY)
+        self.metadata = {**self.metadata, **self.view.metadata}
         self._engine.place(START, _NO_JOINTS)
         self._placed = self._engine.snapshot()
-        self._over = True  # no step before the first reset
+        self._k, self._over = 0, True  # no step before the first reset
+        self._schedule, self._realised = Schedule({}, TIME_STEP), {}
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
         """Start a flight; `options` are those of the class' documentation.
@@ -112,7 +127,9 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         if disturbances is not None:
             self._disturbances = task.parse(disturbances)
         realised = self._disturbances.draw(self.np_random)
+        self._realised = realised
         self._begin(realised, draw_keys(self.np_random, task.STREAMS))
+        self.view.reset()
         return self._measure(), {"time_s": 0.0, "disturbances": realised}
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
@@ -147,13 +164,24 @@ class QuadInfinityPayloadEnv(gym.Env[NDArray[Any], NDArray[Any]]):
         return observation, reward, terminated, truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """A picture of 640 x 480 from a camera that flies along; None without a render mode."""
+        """A picture of the whole path from a camera that flies half-way along; None without a render mode."""
         if self.render_mode is None:
             return None
-        return self._engine.render(Camera(self._engine.read().position, distance=1.6, pitch_deg=20.0))
+        step = self.elapsed
+        pushes = self._schedule.acting(step)
+        path = self._plan[:, :3]
+        return self.view.picture(step * TIME_STEP, CENTRE, pushes, self._realised, path=path, over=self._over)
 
     def close(self) -> None:
         self._engine.close()
+
+    @property
+    def elapsed(self) -> int:
+        return self._k * self._ticks * STEPS
+
+    @property
+    def schedule(self) -> Schedule:
+        return self._schedule
 
     def _begin(self, realised: Mapping[str, Any], keys: NDArray[np.uint64]) -> None:
         """Set an episode up: the vehicle at rest in balance."""

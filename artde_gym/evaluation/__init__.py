@@ -5,6 +5,8 @@ from artde_gym.evaluation.frontier import Frontier, frontier
 from artde_gym.evaluation.reproduce import Reproduction, reproduce
 from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.scenarios import SCENARIOS, Scenario, scenario
+from artde_gym.evaluation.sweep import Sweep, sweep
+from artde_gym.evaluation.sweep_store import read_sweep
 from artde_gym.evaluation.tune import Tuning, tune
 
 __all__ = [
@@ -13,10 +15,13 @@ __all__ = [
     "Reproduction",
     "Result",
     "Scenario",
+    "Sweep",
     "Tuning",
     "evaluate",
     "frontier",
+    "read_sweep",
     "reproduce",
     "scenario",
+    "sweep",
     "tune",
 ]

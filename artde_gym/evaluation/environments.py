@@ -77,6 +77,16 @@ def vector(env_id: str, arguments: str, size: int) -> Any:
     return gym.make_vec(env_id, size, vectorization_mode="vector_entry_point", **given)
 
 
+def drawing(env_id: str, kwargs: Mapping[str, Any], width: int) -> Any:
+    """An environment of one's own that draws pictures `width` pixels wide, and three quarters of it high.
+
+    Raises:
+        OptionError: as of `single`, or where its engine cannot draw.
+    """
+    given = {"width": width, "height": 3 * width // 4, **_checked(env_id, json.dumps(kwargs), "single")}
+    return gym.make(env_id, disable_env_checker=True, render_mode="rgb_array", **given)
+
+
 def _class(env_id: str) -> Any:
     creator: Any = load_env_creator(_entry_point(env_id, "single"))
     if not hasattr(creator, "tracking"):

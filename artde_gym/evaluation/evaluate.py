@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
+import functools
 import hashlib
 import itertools
 import json
-import multiprocessing
-import os
 import pickle
-import signal
-import threading
-from collections.abc import Callable, Generator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
@@ -28,6 +23,7 @@ from artde_gym.evaluation.rollout import Episode, Policy, run_episode
 from artde_gym.evaluation.scenarios import Scenario
 from artde_gym.evaluation.scenarios import scenario as find_scenario
 from artde_gym.evaluation.store import Store
+from artde_gym.evaluation.workers import run_here, run_parallel
 from artde_gym.registration import ControllerSpec, make_controller, register_spec, registered_controllers
 
 DEFAULT_ENVIRONMENT = "BipedWalk-Payload-v0"
@@ -130,19 +126,19 @@ def evaluate(
         raise OptionError("traced", traced, "a whole number >= 0, or None")
     if traced is None:
         traced = episodes if backend == "single" else 0
-    named = _named(controllers)
+    named = named_controllers(controllers)
     gains = {name: dict(values) for name, values in (gains or {}).items()}
     for name in gains:
         if name not in named:
             raise UnknownNameError("gains", name, among(name, named))
-    cells = _cells(env_id, scenario, dict(env_kwargs or {}), disturbances)
+    cells = cells_of(env_id, scenario, dict(env_kwargs or {}), disturbances)
     _try_out(backend, cells, named, gains)
 
     store = None
     if out is not None:
         configuration = {
             "cells": [{"name": cell.name, "env_id": cell.env_id, "kwargs": cell.kwargs} for cell in cells],
-            "controllers": {name: _identity(policy) for name, policy in named.items()},
+            "controllers": {name: identity_of(policy) for name, policy in named.items()},
             "gains": gains,
             "episodes": episodes,
             "seed": seed,
@@ -165,7 +161,7 @@ def evaluate(
             trace_hz,
             sum(episode < traced for episode in left),
         )
-        for chunk in _chunks(episodes, 1 if backend == "single" else CHUNK)  # outermost: whole pairs are left behind
+        for chunk in chunks_of(episodes, 1 if backend == "single" else CHUNK)  # outermost: whole pairs are left behind
         for cell in cells
         for name, policy in named.items()
         if (left := [episode for episode in chunk if (cell.name, name, episode) not in done])
@@ -180,10 +176,12 @@ def evaluate(
             on_progress(Update(task, time, ended, finished, total))
 
     complete = True
-    runs = _run_here(tasks, report) if workers == 1 else _run_parallel(tasks, workers, report)
+    on_time = functools.partial(report, ended=False)
+    runs = run_here(run_task, tasks, on_time) if workers == 1 else run_parallel(run_task, tasks, workers, on_time)
     try:
         for task, results in runs:
-            labelled = [({**_labels(task, i), **result.row}, result.traces) for i, result in enumerate(results)]
+            report(task, duration_of(results), True)
+            labelled = [({**labels_of(task, i), **result.row}, result.traces) for i, result in enumerate(results)]
             if store is None:
                 rows += [row for row, _ in labelled]
             else:
@@ -200,23 +198,19 @@ def evaluate(
     return result
 
 
-Report = Callable[[Task, float, bool], None]
-Runs = Generator[tuple[Task, list[Episode]], None, None]
-
-
 def episode_seed(seed: int, episode: int) -> int:
     """Seed of one episode: independent streams for all pairs of numbers."""
     return int(np.random.SeedSequence([seed, episode]).generate_state(1)[0])
 
 
-def _chunks(episodes: int, size: int) -> list[range]:
+def chunks_of(episodes: int, size: int) -> list[range]:
     """Episodes in equal runs of at most `size`."""
     count = -(-episodes // size)
     edges = [episodes * i // count for i in range(count + 1)]
     return [range(first, stop) for first, stop in itertools.pairwise(edges)]
 
 
-def _named(controllers: Any) -> dict[str, Policy | ControllerSpec]:
+def named_controllers(controllers: Any) -> dict[str, Policy | ControllerSpec]:
     """Controllers by the name under which they are listed, names replaced by what they stand for."""
     if isinstance(controllers, Mapping):
         pairs = list(controllers.items())
@@ -243,12 +237,17 @@ def _named(controllers: Any) -> dict[str, Policy | ControllerSpec]:
     return named
 
 
-def _cells(
+def cells_of(
     env_id: str | None,
     names: str | Sequence[str] | None,
     kwargs: dict[str, Any],
     disturbances: Mapping[str, Any] | None,
 ) -> list[Cell]:
+    """What to run of an environment: named scenarios, or it as it is; arguments as of `evaluate`.
+
+    Raises:
+        UnknownNameError, OptionError: for an unknown scenario, or one of another environment.
+    """
     if "disturbances" in kwargs:
         raise OptionError(
             "env_kwargs", "disturbances", "environment arguments; disturbances have an argument of their own"
@@ -274,24 +273,38 @@ def _try_out(
 ) -> None:
     """Build everything once, so that a bad argument shows before the first episode and not in a worker."""
     for cell in cells:
-        try:
-            json.dumps(cell.kwargs)
-        except TypeError as error:
-            raise OptionError("env_kwargs", cell.kwargs, "values that JSON can write") from error
-        tracking_of(cell.env_id)
-        env = _environment(backend, cell, 1)
+        env = tried(backend, cell)
         for name, item in named.items():
-            _policy(item, env, gains.get(name, {}))
+            policy_for(item, env, gains.get(name, {}))
 
 
-def _identity(item: Policy | ControllerSpec) -> str:
+def tried(backend: Backend, cell: Cell) -> Any:
+    """An environment for a scenario, whose arguments and disturbances have been found good.
+
+    Raises:
+        OptionError, DisturbanceError: if they are not.
+    """
+    try:
+        json.dumps(cell.kwargs)
+    except TypeError as error:
+        raise OptionError("env_kwargs", cell.kwargs, "values that JSON can write") from error
+    tracking_of(cell.env_id)
+    if backend == "batch":
+        return _vector(cell, 1)
+    env, options = _single(cell)
+    env.reset(options=options)
+    return env
+
+
+def identity_of(item: Policy | ControllerSpec) -> str:
     """What tells controllers apart in a store: the entry point, or the content of a policy object."""
     if isinstance(item, ControllerSpec):
         return f"{item.entry_point} {json.dumps(dict(item.kwargs), sort_keys=True)}"
     return f"{type(item).__name__} {hashlib.sha256(pickle.dumps(item)).hexdigest()}"
 
 
-def _labels(task: Task, number: int) -> dict[str, Any]:
+def labels_of(task: Task, number: int) -> dict[str, Any]:
+    """Columns that say which episode a row is of: the task's episode at place `number`."""
     return {
         "controller": task.controller,
         "env": task.cell.env_id,
@@ -301,104 +314,43 @@ def _labels(task: Task, number: int) -> dict[str, Any]:
     }
 
 
-def _run_here(tasks: list[Task], report: Report) -> Runs:
-    for task in tasks:
-        results = _run_task(task, lambda time, task=task: report(task, time, False))
-        report(task, _duration(results), True)
-        yield task, results
-
-
-def _run_parallel(tasks: list[Task], workers: int, report: Report) -> Runs:
-    context = multiprocessing.get_context("spawn")  # a fork would copy physics clients and locks
-    channel, stop = context.Queue(), context.Event()
-    threads = os.environ.get("OMP_NUM_THREADS")
-    os.environ["OMP_NUM_THREADS"] = "1"  # inherited by workers: one core each
-    pool = ProcessPoolExecutor(min(workers, len(tasks) or 1), context, _start_worker, (channel, stop))
-    try:
-        with _ignored_interrupt():  # what a new process inherits: Ctrl-C goes to the whole group, the parent decides
-            running = {pool.submit(_run_in_worker, i, task): i for i, task in enumerate(tasks)}
-        while running:
-            finished, _ = wait(running, timeout=0.2, return_when=FIRST_COMPLETED)
-            while not channel.empty():
-                index, time = channel.get()
-                report(tasks[index], time, False)
-            for future in finished:
-                task = tasks[running.pop(future)]
-                results = future.result()
-                report(task, _duration(results), True)
-                yield task, results
-    finally:
-        stop.set()
-        pool.shutdown(wait=True, cancel_futures=True)
-        channel.close()
-        if threads is None:
-            del os.environ["OMP_NUM_THREADS"]
-        else:
-            os.environ["OMP_NUM_THREADS"] = threads
-
-
-@contextlib.contextmanager
-def _ignored_interrupt() -> Generator[None, None, None]:
-    if threading.current_thread() is not threading.main_thread():
-        yield  # only the main thread may set handlers, and only it is interrupted
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-_worker: dict[str, Any] = {}
-"""A worker process's own: the channel for its progress and the event that asks it to stop."""
-
-
-class _StoppedError(Exception):
-    """Raised in a worker in the middle of an episode that nobody waits for."""
-
-
-def _start_worker(channel: Any, stop: Any) -> None:
-    _worker.update(channel=channel, stop=stop)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    """Workers hold each other's pipes open, so that none would notice a parent that was killed."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
-
-
-def _run_in_worker(index: int, task: Task) -> list[Episode]:
-    def on_progress(time: float) -> None:
-        if _worker["stop"].is_set():
-            raise _StoppedError
-        _worker["channel"].put((index, time))
-
-    return _run_task(task, on_progress)
-
-
-def _run_task(task: Task, on_progress: Callable[[float], None]) -> list[Episode]:
-    env = _environment(task.backend, task.cell, len(task.seeds))
-    policy = _policy(task.policy, env, task.gains)
+def run_task(task: Task, on_progress: Callable[[float], None]) -> list[Episode]:
+    """Run the episodes of a task; `on_progress` is called with the simulated time (s)."""
     options: dict[str, Any] = {"trace_hz": task.trace_hz, "phases": task.cell.phases, "on_progress": on_progress}
     if task.backend == "batch":
+        env = _vector(task.cell, len(task.seeds))
+        policy = policy_for(task.policy, env, task.gains)
         return run_batch(env, policy, task.seeds, traced=task.traced, **options)
-    results = [run_episode(env, policy, seed, **options) for seed in task.seeds]
+    env, reset_options = _single(task.cell)
+    policy = policy_for(task.policy, env, task.gains)
+    results = [run_episode(env, policy, seed, options=reset_options, **options) for seed in task.seeds]
     return [result if i < task.traced else Episode(result.row, {}) for i, result in enumerate(results)]
 
 
-def _environment(backend: Backend, cell: Cell, size: int) -> Any:
-    arguments = json.dumps(cell.kwargs)
-    return single(cell.env_id, arguments) if backend == "single" else vector(cell.env_id, arguments, size)
+def _single(cell: Cell) -> tuple[Any, dict[str, Any] | None]:
+    """An environment, and options for its resets: what differs by its disturbances alone shares an environment."""
+    if "disturbances" not in cell.kwargs:
+        return single(cell.env_id, json.dumps(cell.kwargs)), None
+    options = {"disturbances": cell.kwargs["disturbances"]}
+    return single(cell.env_id, json.dumps({**cell.kwargs, "disturbances": {}})), options
 
 
-def _duration(results: list[Episode]) -> float:
+def _vector(cell: Cell, size: int) -> Any:
+    return vector(cell.env_id, json.dumps(cell.kwargs), size)
+
+
+def duration_of(results: list[Episode]) -> float:
+    """Simulated time (s) of the longest episode."""
     return max(result.row["duration_s"] for result in results)
 
 
-def _policy(item: Policy | ControllerSpec, env: Any, gains: dict[str, Any]) -> Policy:
+def policy_for(item: Policy | ControllerSpec, env: Any, gains: dict[str, Any]) -> Policy:
+    """What drives an environment: a registered controller built for it, or the policy itself.
+
+    Raises:
+        OptionError: for gains of a policy.
+        GainError: for a bad gain.
+    """
     if isinstance(item, ControllerSpec):
         register_spec(item)  # a worker knows only what this project registers itself
         return make_controller(item.name, env, **gains)

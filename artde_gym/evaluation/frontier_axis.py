@@ -57,25 +57,33 @@ class Axis:
         """
         if self.kind is None:
             return dict(disturbances), {**arguments, self.name: value}
-        given = disturbances.get(self.kind)
-        if KINDS[self.kind].repeated:
-            entries = [given] if isinstance(given, Mapping) else given
-            if not (isinstance(entries, (list, tuple)) and entries and all(isinstance(e, Mapping) for e in entries)):
-                raise OptionError("disturbances", given, f"with a list of at least one {self.kind!r}: it is varied")
-            placed: Any = [{**entry, self.name: value} for entry in entries]
-        else:
-            placed = {**self._parameters(given), self.name: value}
-        return {**disturbances, self.kind: placed}, dict(arguments)
+        return placed(disturbances, self.kind, self.name, value), dict(arguments)
 
-    def _parameters(self, given: Any) -> dict[str, Any]:
-        """A disturbance's parameters, also from the short form of a bare number or distribution."""
-        kind = KINDS[str(self.kind)]
-        if given is None:
-            return {}
-        names = {parameter.name for parameter in kind.parameters}
-        if isinstance(given, Mapping) and (kind.scalar is None or not names.isdisjoint(given)):
-            return dict(given)
-        return {str(kind.scalar): given}
+
+def placed(disturbances: Mapping[str, Any], kind: str, name: str, value: Any) -> dict[str, Any]:
+    """Disturbances with `value` for one parameter of a kind, in all its entries; the given ones are left alone.
+
+    Raises:
+        OptionError: for a kind that takes a list, if none is given.
+    """
+    given = disturbances.get(kind)
+    if not KINDS[kind].repeated:
+        return {**disturbances, kind: {**_parameters(kind, given), name: value}}
+    entries = [given] if isinstance(given, Mapping) else given
+    if not (isinstance(entries, (list, tuple)) and entries and all(isinstance(entry, Mapping) for entry in entries)):
+        raise OptionError("disturbances", given, f"with a list of at least one {kind!r}: it is varied")
+    return {**disturbances, kind: [{**entry, name: value} for entry in entries]}
+
+
+def _parameters(kind: str, given: Any) -> dict[str, Any]:
+    """A disturbance's parameters, also from the short form of a bare number or distribution."""
+    if given is None:
+        return {}
+    scalar = KINDS[kind].scalar
+    names = {parameter.name for parameter in KINDS[kind].parameters}
+    if isinstance(given, Mapping) and (scalar is None or not names.isdisjoint(given)):
+        return dict(given)
+    return {str(scalar): given}
 
 
 def axis(

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import datetime
+import functools
 import platform
 import subprocess
 import sys
+from collections.abc import Iterable
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 PACKAGES = (
-    "artde-gym", "gymnasium", "numpy", "scipy", "pandas", "pybullet", "mujoco", "optuna", "torch", "stable-baselines3",
+    "artde-gym", "gymnasium", "numpy", "scipy", "pandas", "pyarrow", "pybullet", "mujoco", "optuna", "ray", "torch",
+    "stable-baselines3",
 )  # fmt: skip
+
+DECISIVE = ("artde-gym", "gymnasium", "mujoco", "numpy", "pybullet", "scipy")
+"""Packages of which another version may change the last bits of a result."""
 
 
 def provenance() -> dict[str, Any]:
@@ -23,10 +29,16 @@ def provenance() -> dict[str, Any]:
         "commit": _commit(),
         "python": platform.python_version(),
         "platform": platform.platform(),
-        "packages": {name: version for name in PACKAGES if (version := _version(name)) is not None},
+        "packages": versions(PACKAGES),
     }
 
 
+def versions(packages: Iterable[str]) -> dict[str, str]:
+    """Versions of those packages that are installed."""
+    return {name: version for name in packages if (version := _version(name)) is not None}
+
+
+@functools.cache
 def _version(package: str) -> str | None:
     try:
         return metadata.version(package)

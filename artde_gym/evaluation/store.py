@@ -132,9 +132,15 @@ def claim(folder: Path, record: str, configuration: Mapping[str, Any]) -> bool:
     return True
 
 
-def write_atomically(path: Path, write: Callable[[BinaryIO], Any]) -> None:
-    """Write a file so that it is there whole or not at all."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+def write_atomically(path: Path, write: Callable[[BinaryIO], Any], by_way_of: Path | None = None) -> None:
+    """Write a file so that it is there whole or not at all; until it is, it has another name in `by_way_of`.
+
+    Args:
+        path: of the file.
+        write: writes its content.
+        by_way_of: a folder of the same file system; None for the file's own.
+    """
+    handle, temporary = tempfile.mkstemp(dir=by_way_of or path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
             write(file)

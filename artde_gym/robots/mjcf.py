@@ -28,8 +28,6 @@ _SUN = {
     "specular": "0 0 0",
     "castshadow": "false",
 }
-_SKY = {"type": "skybox", "builtin": "flat", "rgb1": "1 1 1", "width": "8", "height": "8"}
-_CHECKS = {"type": "2d", "builtin": "checker", "rgb1": ".68 .78 .94", "rgb2": "1 1 1", "width": "256", "height": "256"}
 
 
 def mjcf(spec: RobotSpec) -> str:
@@ -46,10 +44,10 @@ def mjcf(spec: RobotSpec) -> str:
     soft = {"solref": numbers((CONTACT_TIME, 1.0)), "solimp": numbers(IMPEDANCE)}
     ET.SubElement(default, "pair", soft, condim="3")
     ET.SubElement(default, "equality", soft)
-    _scenery(root)
+    _light(root)
 
     world = ET.SubElement(root, "worldbody")
-    ET.SubElement(world, "geom", name=GROUND, type="plane", size="0 0 1", material="checks")
+    ET.SubElement(world, "geom", name=GROUND, type="plane", size="0 0 1", group="3")  # painted, not rendered
     ET.SubElement(world, "light", _SUN)
     bodies: dict[str | None, ET.Element] = {None: world}
     armature = dict(zip(spec.actuated, spec.armature, strict=True))
@@ -77,15 +75,11 @@ def mjcf(spec: RobotSpec) -> str:
     return ET.tostring(root, encoding="unicode")
 
 
-def _scenery(root: ET.Element) -> None:
+def _light(root: ET.Element) -> None:
     visual = ET.SubElement(root, "visual")
     ET.SubElement(visual, "global", fovy="40")
     ET.SubElement(visual, "headlight", ambient=".6 .6 .6", diffuse="0 0 0", specular="0 0 0")
     ET.SubElement(visual, "map", znear="0.02")
-    asset = ET.SubElement(root, "asset")
-    ET.SubElement(asset, "texture", _SKY)
-    ET.SubElement(asset, "texture", _CHECKS, name="checks")
-    ET.SubElement(asset, "material", name="checks", texture="checks", texuniform="true", texrepeat="1 1", specular="0")
 
 
 def _body(parent: ET.Element, link: Link, armature: float) -> ET.Element:

@@ -58,6 +58,8 @@ MIN_WRENCH = (0.0, -MAX_WRENCH[1], -MAX_WRENCH[2], -MAX_WRENCH[3])
 
 Number = TypeVar("Number", float, Array)
 
+STRIPS = 12  # of a rotor disc in pictures
+
 _DARK = (0.16, 0.17, 0.20, 1.0)
 _RED = (0.75, 0.20, 0.18, 1.0)
 _WHITE = (0.90, 0.90, 0.92, 1.0)
@@ -100,15 +102,16 @@ def q450() -> RobotSpec:
 
 
 def _visuals() -> tuple[Box, ...]:
-    """Boxes lie along the axes: an arm, at 45 degrees to them, is a row of them; a rotor disc is three flat ones."""
+    """Boxes lie along the axes: an arm, at 45 degrees to them, is a row of them; a rotor disc is cut into strips."""
     shapes = [Box((0.11, 0.11, 0.05), (0.0, 0.0, 0.0), _WHITE), Box((0.05, 0.04, 0.03), (0.0, 0.0, -0.04), _DARK)]
     for (x, y, _), colour in zip(ROTOR_PLACES, (_RED, _DARK, _DARK, _RED), strict=True):  # red is ahead
         steps = [0.2 + 0.8 * i / 9 for i in range(10)]
         shapes += [Box((0.026, 0.026, 0.018), (share * x, share * y, 0.0), colour) for share in steps]
         shapes.append(Box((0.03, 0.03, 0.04), (x, y, 0.01), _DARK))
-        wide, narrow = 2 * ROTOR_RADIUS, 0.83 * ROTOR_RADIUS
-        for size in ((wide, narrow), (narrow, wide), (1.5 * ROTOR_RADIUS, 1.5 * ROTOR_RADIUS)):
-            shapes.append(Box((*size, 0.004), (x, y, 0.035), _BLADE))
+        for i in range(STRIPS):
+            aside = ROTOR_RADIUS * ((2 * i + 1) / STRIPS - 1)
+            size = (2 * math.sqrt(ROTOR_RADIUS**2 - aside**2), 2 * ROTOR_RADIUS / STRIPS, 0.004)
+            shapes.append(Box(size, (x, y + aside, 0.035), _BLADE))
     for x in (-0.08, 0.08):  # skids
         for y in (-0.08, 0.08):
             shapes.append(Box((0.012, 0.012, 0.08), (x, y, -0.05), _DARK))

@@ -9,12 +9,9 @@ corrupts the first.
 
 from __future__ import annotations
 
-import contextlib
 import math
-import os
 import tempfile
 import weakref
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -26,29 +23,17 @@ from artde_gym.arrays import Array
 from artde_gym.errors import RobotError
 from artde_gym.robots.spec import RobotSpec, Vector
 from artde_gym.robots.urdf import urdf
-from artde_gym.sim.engine import PAYLOAD_COLOUR, PAYLOAD_RADIUS, Camera, State
+from artde_gym.sim.camera import FIELD_OF_VIEW, NEAR, Camera
+from artde_gym.sim.engine import PAYLOAD_COLOUR, PAYLOAD_LOOK, PAYLOAD_RADIUS, State
+from artde_gym.sim.ground import SUN, Shadow, paint
+from artde_gym.sim.quiet import bullet
 from artde_gym.sim.rotation import Quaternion, moved, rotated
-
-
-@contextlib.contextmanager
-def _silent_stderr() -> Iterator[None]:
-    saved, sink = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(sink, 2)
-        yield
-    finally:
-        os.dup2(saved, 2)
-        os.close(saved)
-        os.close(sink)
-
-
-with _silent_stderr():  # PyBullet's C code greets every process with its build time
-    import pybullet as bullet
 
 GEAR_ITERATIONS = 60  # of the solver; with 30, what is left over in the gears raises ARTDE's RMSE in S1 by a third
 BARE_ITERATIONS = 50  # without gears
 GEAR_FORCE = 1e6  # N, more than any gear carries
 PAYLOAD_FORCE = 1e5  # N, likewise
+FAR = 30.0  # m, behind which nothing is drawn
 HOLD_TORQUE = 100.0  # Nm, of the motors that hold joints which nobody actuates
 
 _ORIGIN = (0.0, 0.0, 0.0)
@@ -78,10 +63,16 @@ class BulletEngine:
         self._ground = self._build_ground()
         self._robot = self._build_robot()
         self._ball = bullet.createVisualShape(  # once: Bullet never frees a visual shape
-            bullet.GEOM_SPHERE, radius=PAYLOAD_RADIUS, rgbaColor=PAYLOAD_COLOUR, physicsClientId=self._client
+            bullet.GEOM_MESH,
+            fileName=str(Path(pybullet_data.getDataPath()) / "sphere_smooth.obj"),  # of radius 1
+            meshScale=[PAYLOAD_LOOK] * 3,
+            rgbaColor=PAYLOAD_COLOUR,
+            physicsClientId=self._client,
         )
+        self._sites = {name: (link, offset) for name, link, offset in spec.sites}
         self._com = x, y, z = spec.base.com
         self._to_origin = (-x, -y, -z)  # of the base, from its centre of mass
+        self._shadow = Shadow(spec)
         self._mass_factor = 1.0
         self._friction = math.nan
         self._friction_at: dict[int, float] = {}  # of the contacts in each snapshot
@@ -93,10 +84,6 @@ class BulletEngine:
         mesh = str(Path(pybullet_data.getDataPath()) / "plane100.obj")
         visual = bullet.createVisualShape(bullet.GEOM_MESH, fileName=mesh, physicsClientId=self._client)
         ground = bullet.createMultiBody(0.0, shape, visual, physicsClientId=self._client)
-        texture = bullet.loadTexture(
-            str(Path(pybullet_data.getDataPath()) / "checker_blue.png"), physicsClientId=self._client
-        )
-        bullet.changeVisualShape(ground, -1, textureUniqueId=texture, physicsClientId=self._client)
         bullet.changeDynamics(ground, -1, lateralFriction=1.0, restitution=0.0, physicsClientId=self._client)
         return ground
 
@@ -192,20 +179,21 @@ class BulletEngine:
         bullet.applyExternalTorque(self._robot, -1, torque, bullet.LINK_FRAME, physicsClientId=client)
 
     def push(self, site: str, force: Vector) -> None:
-        for name, link, offset in self.spec.sites:
-            if name == site:
-                origin, quat = self._link_frame(link)
-                point = np.asarray(origin) + _rotation(quat) @ np.asarray(offset)
-                bullet.applyExternalForce(
-                    self._robot,
-                    self._links[link],
-                    force,
-                    point.tolist(),
-                    bullet.WORLD_FRAME,
-                    physicsClientId=self._client,
-                )
-                return
-        raise RobotError("site", site, ", ".join(repr(name) for name, _, _ in self.spec.sites))
+        point = self.site(site)
+        link = self._links[self._site(site)[0]]
+        bullet.applyExternalForce(self._robot, link, force, point, bullet.WORLD_FRAME, physicsClientId=self._client)
+
+    def site(self, name: str) -> Vector:
+        link, offset = self._site(name)
+        origin, quat = self._link_frame(link)
+        x, y, z = (np.asarray(origin) + _rotation(quat) @ np.asarray(offset)).tolist()
+        return x, y, z
+
+    def _site(self, name: str) -> tuple[str, Vector]:
+        """A site's link and place on it."""
+        if name not in self._sites:
+            raise RobotError("site", name, ", ".join(map(repr, self._sites)))
+        return self._sites[name]
 
     def foot_loads(self) -> tuple[float, ...]:
         loads = dict.fromkeys(self._feet, 0.0)  # only feet have a collision shape
@@ -280,6 +268,11 @@ class BulletEngine:
             bullet.removeConstraint(self._holder, physicsClientId=self._client)
             self._holder = None
 
+    def payload_position(self) -> Vector | None:
+        if self._payload is None:
+            return None
+        return bullet.getBasePositionAndOrientation(self._payload, physicsClientId=self._client)[0]
+
     def _remove_payload(self) -> None:
         self.release_payload()
         if self._payload is not None:
@@ -290,18 +283,22 @@ class BulletEngine:
         view = bullet.computeViewMatrixFromYawPitchRoll(
             camera.target, camera.distance, camera.yaw_deg, -camera.pitch_deg, 0.0, 2
         )
-        lens = bullet.computeProjectionMatrixFOV(40.0, camera.width / camera.height, 0.05, 30.0)
-        _, _, rgba, _, _ = bullet.getCameraImage(
+        lens = bullet.computeProjectionMatrixFOV(FIELD_OF_VIEW, camera.width / camera.height, NEAR, FAR)
+        _, _, rgba, _, body = bullet.getCameraImage(
             camera.width,
             camera.height,
             view,
             lens,
-            lightDirection=[1.0, 1.5, 3.0],
+            lightDirection=SUN,
+            shadow=0,
             renderer=bullet.ER_TINY_RENDERER,
             physicsClientId=self._client,
         )
-        picture = np.asarray(rgba, dtype=np.uint8).reshape(camera.height, camera.width, 4)
-        return picture[..., :3].copy()
+        size = (camera.height, camera.width)
+        picture = np.asarray(rgba, dtype=np.uint8).reshape(*size, 4)[..., :3].copy()
+        bare = np.isin(np.asarray(body).reshape(size), (-1, self._ground))
+        paint(picture, bare, camera, self._shadow.polygons(self.read(), self.payload_position()))
+        return picture
 
     def close(self) -> None:
         self._finalizer()

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
 from artde_gym.robots.spec import RobotSpec, Vector
+from artde_gym.sim.camera import Camera
 from artde_gym.sim.rotation import Quaternion
 
 
@@ -26,18 +27,8 @@ class State(NamedTuple):
     angular_velocity: Vector
 
 
-class Camera(NamedTuple):
-    """A camera that looks at `target` (m) from `distance` (m), `yaw_deg` about z and `pitch_deg` above the horizon."""
-
-    target: Vector
-    distance: float = 1.9
-    yaw_deg: float = 55.0
-    pitch_deg: float = 12.0
-    width: int = 640
-    height: int = 480
-
-
-PAYLOAD_RADIUS = 0.08  # m, of the homogeneous ball that is the payload; it shows on either side of Ojas' torso
+PAYLOAD_RADIUS = 0.08  # m, of the homogeneous ball that is the payload
+PAYLOAD_LOOK = 0.09  # m, likewise in pictures, so that it shows on either side of Ojas' torso
 PAYLOAD_COLOUR = (0.85, 0.45, 0.1, 1.0)
 
 
@@ -132,12 +123,26 @@ class Engine(World, Protocol):
         """
         ...
 
+    def site(self, name: str) -> Vector:
+        """Where a named site of the spec is now (m, world axes).
+
+        Raises:
+            RobotError: for a site that the spec does not have.
+        """
+        ...
+
+    def payload_position(self) -> Vector | None:
+        """Where the payload's centre is now (m, world axes), held or falling; None without one."""
+        ...
+
     def ground_forces(self) -> Array:
         """Whole force of the ground on each foot during the last step, (feet, 3) (N, world axes)."""
         ...
 
     def render(self, camera: Camera) -> NDArray[np.uint8]:
-        """A picture, (height, width, 3); it changes nothing.
+        """A picture, (height, width, 3), of robot and payload on the ground of `artde_gym.sim.ground`.
+
+        It changes nothing.
 
         Raises:
             OptionError: where the engine cannot draw on this machine.

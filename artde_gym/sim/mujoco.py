@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
 from artde_gym.robots.spec import RobotSpec, Vector
-from artde_gym.sim.engine import Camera, State
+from artde_gym.sim.camera import Camera
+from artde_gym.sim.engine import State
+from artde_gym.sim.ground import Shadow, paint
 from artde_gym.sim.mujoco_canvas import Canvas
 from artde_gym.sim.mujoco_world import STATE, Blueprint, Fields, MujocoWorld
 from artde_gym.sim.rotation import Quaternion, moved, rotated
@@ -60,6 +62,7 @@ class MujocoEngine(MujocoWorld):
         self._scratch = mj.MjData(model)
         self._snapshots: list[tuple[Array, Array, Array]] = []
         self._canvas = Canvas(model) if renders else None
+        self._shadow = Shadow(spec)
 
     def place(self, position: Vector, q: Array) -> None:
         self._remove_payload()
@@ -128,22 +131,26 @@ class MujocoEngine(MujocoWorld):
         super().release_payload()
         self._fall = None
 
-    def _payload_center(self) -> Array | None:
-        """Where the payload is, held or falling."""
+    def payload_position(self) -> Vector | None:
         if self.held is not None:
             state = self.read()
-            return np.add(state.position, rotated(self.held, state.quat_xyzw))
+            (x, y, z), (ax, ay, az) = state.position, rotated(self.held, state.quat_xyzw)
+            return x + ax, y + ay, z + az
         if self._fall is not None:
             position, velocity, start = self._fall
             time = self._data.time - start
-            return position + velocity * time + self._model.opt.gravity * (time * time / 2)
+            x, y, z = (position + velocity * time + self._model.opt.gravity * (time * time / 2)).tolist()
+            return x, y, z
         return None
 
     def render(self, camera: Camera) -> NDArray[np.uint8]:
         if self._canvas is None:
             self._canvas = Canvas(self._model)
         mj.mj_camlight(self._model, self.placed())
-        return self._canvas.draw(self._data, camera, self._payload_center())
+        ball = self.payload_position()
+        picture, bare = self._canvas.draw(self._data, camera, ball)
+        paint(picture, bare, camera, self._shadow.polygons(self.read(), ball))
+        return picture
 
     def close(self) -> None:
         if self._canvas is not None:

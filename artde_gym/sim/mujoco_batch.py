@@ -62,10 +62,11 @@ class MujocoBatch:
         self._sensors = batch.bind("sensordata")
         self._forces = np.zeros(self._sensors.shape)  # as of `_sensors`, and those of restored snapshots
         self._place = mj.MjData(blueprint.model)
-        self._pushed: list[_Row] = []
-        fields = [*map(batch.expand, FIELDS), batch.bind("xfrc_applied")]
+        self._pushes = batch.bind("xfrc_applied")
+        self._pushed: list[int] = []  # worlds with forces that the next step takes up
+        fields = [*map(batch.expand, FIELDS), self._pushes]
         self._friction = fields[FIELDS.index("pair_friction")]
-        self.worlds = [_Row(self, i, Fields(*(field[i] for field in fields))) for i in range(n)]
+        self.worlds = [_Row(blueprint, Fields(*(field[i] for field in fields)), self, i) for i in range(n)]
         self._snapshots: list[tuple[Array, Array, Array]] = []
 
     def place(self, world: int, position: Vector, q: Array) -> None:
@@ -105,9 +106,9 @@ class MujocoBatch:
         self._torque[rows, self._speeds] = tau
         self._batch.step(worlds, steps)
         self._forces[rows] = self._sensors[rows]
-        for row in self._pushed:
-            row.forget_pushes()
-        self._pushed = []
+        if self._pushed:
+            self._pushes[self._pushed] = 0.0
+            self._pushed = []
 
     def foot_loads(self) -> Array:
         """Normal forces on the feet during the last step (n, feet) (N); a view."""
@@ -118,31 +119,36 @@ class MujocoBatch:
         return self._forces
 
     def placed(self, world: int) -> Any:
-        """See `MujocoWorld`; until the next call."""
+        """See `MujocoWorld.placed`; until the next call."""
         self._place.qpos[:] = self._pose[world]
         mj.mj_kinematics(self._blueprint.model, self._place)
         return self._place
+
+    def masses_changed(self, world: int) -> None:
+        """See `MujocoWorld.masses_changed`."""
+        self._batch.set_const(np.array([world]))
+
+    def pushed(self, world: int) -> None:
+        """A world has forces that act in the next step only."""
+        self._pushed.append(world)
 
 
 class _Row(MujocoWorld):
     """One world of a batch."""
 
-    def __init__(self, batch: MujocoBatch, number: int, fields: Fields) -> None:
-        super().__init__(batch._blueprint, fields)
-        self._batch, self._number, self._ids = batch, number, np.array([number], np.int32)
+    def __init__(self, blueprint: Blueprint, fields: Fields, batch: MujocoBatch, number: int) -> None:
+        super().__init__(blueprint, fields)
+        self._batch, self._number = batch, number
 
     def placed(self) -> Any:
         return self._batch.placed(self._number)
 
     def masses_changed(self) -> None:
-        self._batch._batch.set_const(self._ids)
+        self._batch.masses_changed(self._number)
 
     def foot_loads(self) -> tuple[float, ...]:
-        return tuple(self._batch._forces[self._number, 2::3].tolist())
+        return tuple(self._batch.foot_loads()[self._number].tolist())
 
     def add_force(self, body: int, force: Vector, torque: Vector | NDArray[Any]) -> None:
         super().add_force(body, force, torque)
-        self._batch._pushed.append(self)
-
-    def forget_pushes(self) -> None:
-        self._fields.pushes[:] = 0.0
+        self._batch.pushed(self._number)

@@ -16,9 +16,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from artde_gym.arrays import Array
 from artde_gym.errors import OptionError
-from artde_gym.sim.engine import PAYLOAD_COLOUR, PAYLOAD_RADIUS, Camera
+from artde_gym.robots.spec import Vector
+from artde_gym.sim.camera import Camera
+from artde_gym.sim.engine import PAYLOAD_COLOUR, PAYLOAD_LOOK
 
 mj: Any = mujoco  # compiled, without type information
 
@@ -47,26 +48,27 @@ class Canvas:
         self._finalizer.atexit = False  # too late: EGL's display is closed by then
         atexit.register(self._finalizer)
 
-    def draw(self, data: Any, camera: Camera, ball: Array | None) -> NDArray[np.uint8]:
-        """A picture, (height, width, 3), with the payload's ball at `ball` (m), if there is one."""
+    def draw(self, data: Any, camera: Camera, ball: Vector | None) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+        """A picture, (height, width, 3), with the payload's ball at `ball` (m), if there is one; where it is bare."""
         scene, rect = self._scene, mj.MjrRect(0, 0, camera.width, camera.height)
         eye = mj.MjvCamera()
         eye.lookat[:] = camera.target
         eye.distance, eye.azimuth, eye.elevation = camera.distance, camera.yaw_deg + 90.0, -camera.pitch_deg
         everything = mj.mjtCatBit.mjCAT_ALL.value
         mj.mjv_updateScene(self._model, data, mj.MjvOption(), None, eye, everything, scene)
-        if ball is not None:
-            size, colour = np.full(3, PAYLOAD_RADIUS), np.array(PAYLOAD_COLOUR, dtype=np.float32)
+        if ball is not None and ball[2] > -PAYLOAD_LOOK:  # the ground, which would hide it, is not drawn
+            size, colour = np.full(3, PAYLOAD_LOOK), np.array(PAYLOAD_COLOUR, dtype=np.float32)
             shape = mj.mjtGeom.mjGEOM_SPHERE
-            mj.mjv_initGeom(scene.geoms[scene.ngeom], shape, size, ball, np.eye(3).ravel(), colour)
+            mj.mjv_initGeom(scene.geoms[scene.ngeom], shape, size, np.array(ball), np.eye(3).ravel(), colour)
             scene.ngeom += 1
         picture = np.empty((camera.height, camera.width, 3), dtype=np.uint8)
+        depth = np.empty((camera.height, camera.width), dtype=np.float32)
         self._context.make_current()
         if (self._painter.offWidth, self._painter.offHeight) != (camera.width, camera.height):
             mj.mjr_resizeOffscreen(camera.width, camera.height, self._painter)
         mj.mjr_render(rect, scene, self._painter)
-        mj.mjr_readPixels(picture, None, rect, self._painter)
-        return picture[::-1].copy()  # OpenGL counts rows from below
+        mj.mjr_readPixels(picture, depth, rect, self._painter)
+        return picture[::-1].copy(), depth[::-1] == 1.0  # OpenGL counts rows from below
 
     def close(self) -> None:
         """Free what the context holds; safe to call twice."""

@@ -82,13 +82,22 @@ class MujocoWorld(abc.ABC):
     def foot_loads(self) -> tuple[float, ...]: ...
 
     def push(self, site: str, force: Vector) -> None:
-        sites = self._blueprint.sites
-        if site not in sites:
-            raise RobotError("site", site, ", ".join(map(repr, sites)))
-        data, number = self.placed(), sites[site]
+        number, data = self._site(site), self.placed()
         body = self._blueprint.model.site_bodyid[number]
         arm = data.site_xpos[number] - data.xipos[body]
         self.add_force(body, force, np.cross(arm, force))
+
+    def site(self, name: str) -> Vector:
+        """As of `artde_gym.sim.engine.Engine`."""
+        number = self._site(name)
+        x, y, z = self.placed().site_xpos[number].tolist()
+        return x, y, z
+
+    def _site(self, name: str) -> int:
+        sites = self._blueprint.sites
+        if name not in sites:
+            raise RobotError("site", name, ", ".join(map(repr, sites)))
+        return sites[name]
 
     def add_force(self, body: int, force: Vector, torque: Vector | NDArray[Any]) -> None:
         """Add a force and a torque (world axes) at a body's centre of mass, for the next step only."""

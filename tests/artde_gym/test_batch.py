@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from artde_gym.cli import app
 from artde_gym.errors import DisturbanceError, OptionError
 from artde_gym.evaluation import Result, evaluate
-from artde_gym.evaluation.evaluate import Update, _chunks
+from artde_gym.evaluation.evaluate import Update, chunks_of
 
 HARNESS = importlib.import_module("artde_gym.evaluation.evaluate")  # the package has the function by this name
 QUADROTOR = "QuadInfinity-Payload-v0"
@@ -179,7 +179,7 @@ def test_progress_counts_episodes(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_chunks_cover_all_evenly() -> None:
     for episodes in (1, 7, 2048, 2049, 10_000):
-        chunks = _chunks(episodes, 2048)
+        chunks = chunks_of(episodes, 2048)
         assert [i for chunk in chunks for i in chunk] == list(range(episodes))
         sizes = {len(chunk) for chunk in chunks}
         assert max(sizes) <= 2048

@@ -247,7 +247,7 @@ def test_render_shows_the_robot(drawing_engine: EngineName) -> None:
     assert picture.dtype == np.uint8
     red, blue = picture[..., 0].astype(int), picture[..., 2].astype(int)
     torso, payload = (blue > red + 50) & (blue < 180), red > blue + 80
-    feet = (picture.max(axis=-1) < 80) & (np.arange(480)[:, None] > 330)
+    feet = (picture.max(axis=-1) < 80) & (abs(np.arange(480)[:, None] - 370) < 40)  # text is below
     (top, middle, bottom), columns = (np.nonzero(part)[0].mean() for part in (torso, payload, feet)), []
     assert abs(top - middle) < 30
     assert bottom > top + 150

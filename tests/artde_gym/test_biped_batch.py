@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -334,3 +335,20 @@ def test_two_vectors_in_one_process_do_not_touch_each_other() -> None:
 
     env.step = disturbed
     assert walked_together(env, 3, 40) == alone
+
+
+def test_memory_does_not_grow_with_steps_and_restarts() -> None:
+    env = make(4, disturbances=VARIED, duration=0.1)
+    env.reset(seed=0)
+
+    def resident() -> int:
+        return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * 4096
+
+    def run(steps: int) -> None:
+        for _ in range(steps):
+            env.step(np.zeros((4, 12)))
+
+    run(110)
+    before = resident()
+    run(330)
+    assert resident() - before < 2e6

@@ -30,7 +30,7 @@ def headline(result: Result, trackings: dict[str, Tracking]) -> str:
         return f"{result.controllers[0]} was evaluated alone: there is nothing to compare it with."
     won: dict[str, list[str]] = {}
     for scenario in result.scenarios:
-        best = ranking(result, scenario, _metric(trackings[scenario]))[0]
+        best = ranking(result, scenario, metric_of(trackings[scenario]))[0]
         won.setdefault("nobody" if _all_fall(result, scenario) else best, []).append(scenario)
     parts = [f"{name} in {', '.join(scenarios)}" for name, scenarios in sorted(won.items(), key=lambda x: -len(x[1]))]
     return f"Best, by falls first and RMS error second: {'; '.join(parts)}."
@@ -38,7 +38,7 @@ def headline(result: Result, trackings: dict[str, Tracking]) -> str:
 
 def sentences(result: Result, scenario: str, tracking: Tracking) -> list[str]:
     """What a scenario shows: the leader's falls and error, then how the others compare with it, the closest first."""
-    metric = _metric(tracking)
+    metric = metric_of(tracking)
     best, *rivals = names = ranking(result, scenario, metric)
     count = min(len(result.rows(scenario, name)) for name in names)
     care = [f"Only {count} seed{'s' if count != 1 else ''}: take the intervals with care."] if count < FEW else []
@@ -79,7 +79,8 @@ def _all_fall(result: Result, scenario: str) -> bool:
     return bool(result.episodes.loc[result.episodes["scenario"] == scenario, "fell"].all())
 
 
-def _metric(tracking: Tracking) -> str:
+def metric_of(tracking: Tracking) -> str:
+    """Name of the RMS error that controllers are ranked by."""
     return f"rmse_{tracking.errors[0].unit}"
 
 

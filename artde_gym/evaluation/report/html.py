@@ -28,7 +28,7 @@ def page(title: str, body: Iterable[str]) -> str:
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<meta name="color-scheme" content="light dark">\n<link rel="icon" href="data:,">\n'
-        f"<title>{escape(title)}</title>\n<style>\n{_asset('style.css')}</style>\n</head>\n<body>\n<main>\n"
+        f"<title>{escape(title)}</title>\n<style>\n{_asset('chart.css')}{_asset('style.css')}</style>\n</head>\n<body>\n<main>\n"
         + "\n".join(body)
         + f"\n</main>\n<script>\n{_asset('sort.js')}</script>\n</body>\n</html>\n"
     )
@@ -75,15 +75,17 @@ def table(caption: str, columns: Sequence[str], rows: Iterable[Sequence[str | Ce
     )
 
 
-def figure(caption: str, charts: Mapping[str, str], legend: Mapping[str, Look] | None = None) -> str:
-    """Charts by their heads, side by side where there is room, under one legend."""
+def figure(
+    caption: str, charts: Mapping[str, str], legend: Mapping[str, Look] | None = None, *, kind: str = "charts"
+) -> str:
+    """Charts by their heads, side by side where there is room, under one legend; or "shots", or a "film"."""
     drawn = "".join(
         f'<div class="chart">{f"<h4>{escape(head)}</h4>" if head else ""}{svg}</div>' for head, svg in charts.items()
     )
     keys = "".join(_key(name, look) for name, look in (legend or {}).items())
     return (
         f"<figure><figcaption>{escape(caption)}</figcaption>{f'<p class=legend>{keys}</p>' if keys else ''}"
-        f'<div class="charts">{drawn}</div></figure>'
+        f'<div class="{kind}">{drawn}</div></figure>'
     )
 
 

@@ -32,7 +32,6 @@ class Laws:
 
     def __init__(self, run: Run) -> None:
         self._run = run
-        self._given: Mapping[str, Mapping[str, Any]] = run.record["configuration"].get("gains", {})
         self.gains = functools.cache(self._find_gains)  # scenario -> the same dict, found once a report
 
     def robot(self, scenario: str) -> Any:
@@ -41,10 +40,10 @@ class Laws:
 
     def _find_gains(self, scenario: str) -> dict[str, Gains]:
         """Controller -> gain -> value; those of a cascade's loops end in _p and _q."""
-        env, found = self._environment(scenario), {}
+        env, found, given = self._environment(scenario), {}, self._run.gains(scenario)
         for name in self._run.result.controllers:
             if name in registered_controllers():
-                policy = make_controller(name, env, **self._given.get(name, {}))
+                policy = make_controller(name, env, **given.get(name, {}))
                 found[name] = dict(_flat(getattr(policy, "gains", None)))
         return found
 

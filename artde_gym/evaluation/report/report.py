@@ -16,6 +16,7 @@ from artde_gym.evaluation.report import biped, diagram, flight, frontier_page, s
 from artde_gym.evaluation.report.answer import headline, sentences
 from artde_gym.evaluation.report.html import bullets, page, paragraph, section
 from artde_gym.evaluation.report.laws import Laws, unavailable
+from artde_gym.evaluation.report.pictures import Album, Progress
 from artde_gym.evaluation.report.run import Episode, Run
 from artde_gym.evaluation.scenarios import SCENARIOS
 from artde_gym.evaluation.store import write_atomically
@@ -24,11 +25,16 @@ NAME = "report.html"
 _LAST = ("Reference and loop", "Provenance")
 
 
-def write_report(folder: str | Path) -> Path:
+def write_report(
+    folder: str | Path, *, pictures: bool = False, videos: bool = False, on_progress: Progress = lambda _: None
+) -> Path:
     """Write the report of an evaluation or a frontier into its folder; a run that was interrupted has one, too.
 
     Args:
         folder: what `evaluate` or `frontier` wrote.
+        pictures: of an evaluation: whether to run the shown episodes again for pictures of motion, pushes and falls.
+        videos: likewise, for a video of each scenario (about a megabyte each).
+        on_progress: called with what is being drawn.
 
     Returns:
         The file.
@@ -39,12 +45,16 @@ def write_report(folder: str | Path) -> Path:
     folder = Path(folder)
     if not folder.is_dir():
         raise StoreError("results folder", str(folder), "a folder that `evaluate` or `frontier` wrote")
-    text = _frontier(folder) if (folder / RECORD).exists() else _evaluation(Run.read(folder))
+    if (folder / RECORD).exists():
+        text = _frontier(folder)
+    else:
+        run = Run.read(folder)
+        text = _evaluation(run, Album(run, pictures, videos, on_progress))
     write_atomically(folder / NAME, lambda file: file.write(text.encode()))
     return folder / NAME
 
 
-def _evaluation(run: Run) -> str:
+def _evaluation(run: Run, album: Album) -> str:
     result = run.result
     if not len(result.episodes):
         return page("artde-gym report", ["<h1>No episode was finished yet</h1>", _origin(run.record)])
@@ -60,7 +70,7 @@ def _evaluation(run: Run) -> str:
     if run.claims is not None:
         body.append(_anchored("Claims", tables.claims(run.claims)))
     laws = Laws(run)
-    body += [_scenario(run, laws, name, [] if lone else lines) for name, lines in said.items()]
+    body += [_scenario(run, laws, album, name, [] if lone else lines) for name, lines in said.items()]
     body += [_anchored("Reference and loop", *_plants(run)), _anchored("Provenance", _origin(run.record))]
     return page(f"artde-gym: {title}", body)
 
@@ -81,13 +91,15 @@ def _plants(run: Run) -> list[str]:
     return [part for several in parts.values() for part in several]
 
 
-def _scenario(run: Run, laws: Laws, scenario: str, said: list[str]) -> str:
+def _scenario(run: Run, laws: Laws, album: Album, scenario: str, said: list[str]) -> str:
     entry, cell = SCENARIOS.get(scenario), run.cell(scenario)
     parts = [paragraph(f"{cell['env_id']}: {entry.text}." if entry else f"{cell['env_id']}.", "soft")]
     parts += [bullets(said) if said else "", tables.falls(run, scenario)]
     if run.result.episodes.loc[run.result.episodes["scenario"] == scenario, "fell"].any():
         parts.append(tables.survival(run, scenario))
+    parts += album.figures(scenario)
     parts += tables.metrics(run, scenario)
+    parts.append(tables.events(run, scenario))
     episode = run.episode(scenario)
     if episode is None:
         parts.append(paragraph("No signals were stored for this scenario, so there are no plots over time.", "soft"))

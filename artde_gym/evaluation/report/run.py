@@ -19,6 +19,7 @@ from artde_gym.evaluation.metrics import Span, events_of
 from artde_gym.evaluation.result import Result
 from artde_gym.tracking import Tracking
 
+ABLATIONS = "ablation"  # folder of `reproduce`'s ablations
 TIME = "time"
 INSIDE = "policy."
 
@@ -28,15 +29,17 @@ class Run:
     """An evaluation on disk.
 
     Attributes:
-        result: its finished episodes.
+        result: its finished episodes, those of an ablation among them.
         record: what `summary.json` holds: configuration and provenance.
         claims: the thesis' claims with their verdicts, if they were judged.
+        ablation: scenario -> the run of `reproduce`'s ablation in it, in a folder of its own.
     """
 
     folder: Path
     result: Result
     record: Mapping[str, Any]
     claims: pd.DataFrame | None = None
+    ablation: Mapping[str, Run] = dataclasses.field(default_factory=dict)
 
     @classmethod
     def read(cls, folder: Path) -> Run:
@@ -55,9 +58,20 @@ class Run:
         text = path.read_text(encoding="utf-8") if path.exists() else ""
         whole = text[: text.rfind("\n") + 1]
         episodes = pd.read_csv(io.StringIO(whole)) if whole else pd.DataFrame({"controller": [], "scenario": []})
+        complete = len(episodes) >= count
         claims = folder / "claims.csv"
         judged = pd.read_csv(claims, keep_default_na=False) if claims.exists() else None
-        return cls(folder, Result(episodes, folder, len(episodes) >= count), record, judged)
+        found = {file.parent.name: cls.read(file.parent) for file in folder.glob(f"{ABLATIONS}/*/summary.json")}
+        ablation = {cell["name"]: found[cell["name"]] for cell in wanted["cells"] if cell["name"] in found}
+        if ablation:
+            episodes = pd.concat([episodes, *(part.result.episodes for part in ablation.values())], ignore_index=True)
+            complete = complete and all(part.result.complete for part in ablation.values())
+        return cls(folder, Result(episodes, folder, complete), record, judged, ablation)
+
+    def gains(self, scenario: str) -> dict[str, Mapping[str, Any]]:
+        """Controller -> gains in place of its preset's."""
+        own = dict(self.record["configuration"].get("gains", {}))
+        return own | (self.ablation[scenario].gains(scenario) if scenario in self.ablation else {})
 
     def cell(self, scenario: str) -> Mapping[str, Any]:
         """Environment and arguments of a scenario."""
@@ -80,6 +94,9 @@ class Run:
         return None
 
     def _signals(self, scenario: str, controller: str, number: int) -> Signals | None:
+        part = self.ablation.get(scenario)
+        if part is not None and controller in part.result.controllers:
+            return part._signals(scenario, controller, number)
         path = self.folder / "traces" / scenario / f"{controller}-{number}.npz"
         rows = self.result.rows(scenario, controller)
         if not path.exists() or number not in rows.index:

@@ -71,6 +71,11 @@ def survival(run: Run, scenario: str) -> str:
         chart.line(x, y, shown[name], text=name, kind="path")
         chart.marker(end, float(y[-1]), shown[name], f"{name}: {y[-1]:.0f} %")
     caption = "Survival: the share of episodes in which the robot has not fallen yet."
+    printed = thesis.TIME_TO_FALL.get(_reference(scenario) or "", {})
+    for name, time in printed.items():
+        if name in shown and time <= end:
+            chart.cross(time, 50.0, shown[name], f"{name} fell at {time:g} s in the thesis")
+            caption += f" Cross at half height: {name} fell at {time:g} s in the thesis."
     return figure(caption, {"": chart.svg()}, shown)
 
 
@@ -82,6 +87,42 @@ def metrics(run: Run, scenario: str) -> list[str]:
         lines = _table(run, scenario, metric, title, axes)
         parts.append(_dots(run, scenario, metric, title, axes) + lines if number == 0 else details(title, lines))
     return parts
+
+
+def events(run: Run, scenario: str) -> str:
+    """What follows each push and drop: the peak of the error, and the time until it is back."""
+    result, main = run.result, run.tracking(scenario).errors[0]
+    text, digits = UNITS[main.unit]
+    peak = f"peak_error_{main.unit}_"
+    rows = []
+    for event in (name.removeprefix(peak) for name in result.metrics if name.startswith(peak)):
+        for name in result.controllers:
+            peaks = result.values(scenario, name, peak + event)
+            times = result.values(scenario, name, f"recovery_time_s_{event}")
+            reached = int(np.isfinite(peaks).sum())
+            if not reached:
+                continue
+            height, back = statistics.mean(peaks), statistics.mean(times)
+            never = int(np.isinf(times).sum())
+            rows.append([
+                event,
+                name,
+                Cell(f"{reached} of {len(peaks)}", reached),
+                Cell(_text(height, digits), height.value),
+                Cell(_text(back, 2), back.value if back.n else None),
+                Cell(str(never), never),
+            ])  # fmt: skip
+    if not rows:
+        return ""
+    columns = [
+        "event",
+        "controller",
+        "episodes that reached it",
+        f"peak error ({text})",
+        "recovery (s)",
+        "never recovered",
+    ]
+    return table(f"{scenario}: after pushes and drops (95 % intervals)", columns, rows)
 
 
 def _table(run: Run, scenario: str, metric: str, title: str, axes: list[str]) -> str:

@@ -1,0 +1,49 @@
+"""`artde-gym play`: a person in the loop."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+import typer
+
+from artde_gym.cli.arguments import (
+    WALK,
+    Disturbances,
+    Engine,
+    EnvKwargs,
+    Gains,
+    Seed,
+    environment_kwargs,
+    json_object,
+    optional_json,
+)
+from artde_gym.registration import make_controller
+
+
+def play(
+    controller: Annotated[str, typer.Option(help="Name; see `list`.")] = "artde",
+    scenario: Annotated[str | None, typer.Option(help="Name; see `list`. Default: none, with --env as it is.")] = None,
+    env: Annotated[str | None, typer.Option(help=f"Environment id. Default: the scenario's, or {WALK}.")] = None,
+    seed: Seed = 0,
+    engine: Engine = None,
+    disturbances: Disturbances = None,
+    env_kwargs: EnvKwargs = None,
+    gains: Gains = None,
+) -> None:
+    """Watch a controller live in a window of Bullet's, push the robot and drop its payload by key or mouse."""
+    from artde_gym.evaluation.environments import single  # only when asked for
+    from artde_gym.evaluation.evaluate import cells_of
+    from artde_gym.play import HELP, Session
+    from artde_gym.sim.window import Window
+
+    kwargs = environment_kwargs(env_kwargs, engine)
+    (cell,) = cells_of(env, scenario, kwargs, optional_json("--disturbances", disturbances))
+    plant = single(cell.env_id, json.dumps(cell.kwargs))
+    policy = make_controller(controller, plant, **json_object("--gains", gains))
+    window = Window(plant.unwrapped.engine.spec)
+    print(f"{HELP}\nclick: push away from you, at the nearest place on the robot")
+    try:
+        Session(plant, policy, window, controller, seed).run()
+    finally:
+        window.close()

@@ -1,0 +1,41 @@
+"""`artde-gym sweep`: any number of cells in seeded episodes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from artde_gym.cli.arguments import Workers, processes
+from artde_gym.cli.display import Display
+from artde_gym.evaluation import sweep as run_sweep
+from artde_gym.evaluation.sweep_console import print_sweep
+
+
+def sweep(
+    file: Annotated[Path, typer.Argument(help="YAML: what to run.")],
+    out: Annotated[Path | None, typer.Option(help="Results folder. Default: runs/<name of the file>.")] = None,
+    workers: Workers = None,
+    executor: Annotated[
+        str, typer.Option("--executor", "--engine", help="local: processes of this machine; ray: a Ray cluster.")
+    ] = "local",
+    address: Annotated[
+        str | None, typer.Option(help="Of a running Ray cluster, auto for this machine's. Default: one of its own.")
+    ] = None,
+) -> None:
+    """Run a grid or a random sample of cells; the same command continues after whatever happened."""
+    console = Console()
+    with Display(console) as display:
+        found = run_sweep(
+            file,
+            out or Path("runs") / file.stem,
+            workers=processes(workers),
+            executor=executor,  # pyright: ignore[reportArgumentType]  # checked there
+            address=address,
+            on_progress=lambda what, update: display(update, what),
+        )
+    print_sweep(found, console)
+    if not found.complete:
+        raise typer.Exit(130)

@@ -1,0 +1,71 @@
+"""`artde-gym video`: an episode to look at."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import Progress, TextColumn, TimeElapsedColumn
+
+from artde_gym.cli.arguments import (
+    WALK,
+    Controllers,
+    Disturbances,
+    Engine,
+    EnvKwargs,
+    Gains,
+    Seed,
+    environment_kwargs,
+    json_object,
+    names,
+    optional_json,
+)
+
+
+def video(
+    out: Annotated[Path, typer.Option(help="File: .mp4 or .webm (with ffmpeg), .gif, .webp, or .png for one picture.")],
+    controllers: Controllers = "artde",
+    scenario: Annotated[str | None, typer.Option(help="Name; see `list`. Default: none, with --env as it is.")] = None,
+    env: Annotated[str | None, typer.Option(help=f"Environment id. Default: the scenario's, or {WALK}.")] = None,
+    seed: Seed = 0,
+    episode: Annotated[int, typer.Option(help="Which episode of `evaluate` with this seed.")] = 0,
+    start: Annotated[float, typer.Option(help="Beginning of the part that is shown (s).")] = 0.0,
+    end: Annotated[float, typer.Option(help="Its end (s).", show_default=False)] = math.inf,
+    speed: Annotated[float, typer.Option(help="0.5 shows it half as fast.")] = 1.0,
+    fps: Annotated[float, typer.Option(help="Pictures a second.")] = 30.0,
+    width: Annotated[int, typer.Option(help="Pixels of one controller's panel; its height is 3/4 of it.")] = 640,
+    columns: Annotated[int | None, typer.Option(help="Panels in a row. Default: all.")] = None,
+    engine: Engine = None,
+    disturbances: Disturbances = None,
+    env_kwargs: EnvKwargs = None,
+    gains: Gains = None,
+) -> None:
+    """Show one or several controllers, side by side, in an episode of `evaluate`."""
+    from artde_gym.evaluation.film import video as make_video  # only when asked for
+
+    console = Console()
+    columns_shown = (TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns_shown, console=console, transient=True) as bar:
+        shown = bar.add_task("")
+        file = make_video(
+            names(controllers),
+            out,
+            env,
+            scenario=scenario,
+            seed=seed,
+            episode=episode,
+            start=start,
+            end=end,
+            speed=speed,
+            fps=fps,
+            width=width,
+            columns=columns,
+            disturbances=optional_json("--disturbances", disturbances),
+            env_kwargs=environment_kwargs(env_kwargs, engine),
+            gains=json_object("--gains", gains),
+            on_progress=lambda time: bar.update(shown, description=f"{time:.1f} s simulated"),
+        )
+    console.print(f"Written to {file}", soft_wrap=True)

@@ -1,0 +1,107 @@
+"""Moving pictures as files: MP4 and WebM through ffmpeg, GIF and WebP without."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from artde_gym.errors import OptionError
+
+Picture = NDArray[np.uint8]
+
+CODECS: dict[str, list[str]] = {
+    ".mp4": ["-c:v", "libx264", "-crf", "24", "-preset", "veryfast", "-pix_fmt", "yuv420p", "-movflags", "+faststart"],
+    ".webm": ["-c:v", "libvpx-vp9", "-crf", "36", "-b:v", "0", "-cpu-used", "5", "-row-mt", "1", "-pix_fmt", "yuv420p"],
+}
+SUFFIXES = (*CODECS, ".gif", ".webp", ".png")
+COLOURS = 192  # of a GIF
+SAMPLED = 12  # pictures that a GIF's palette is made of
+QUALITY = 75  # of a WebP
+
+
+def check(out: Path) -> None:
+    """See that a file can be made.
+
+    Raises:
+        OptionError: for a suffix that nothing is known for, or ffmpeg that is missing.
+    """
+    if out.suffix not in SUFFIXES:
+        raise OptionError("out", str(out), f"a file that ends in {', '.join(SUFFIXES)}")
+    if out.suffix in CODECS:
+        _ffmpeg(out)
+
+
+def frame_rate(out: Path, fps: float) -> float:
+    """The closest rate that the format can have: a GIF counts in hundredths of a second."""
+    return 100 / max(2, round(100 / fps)) if out.suffix == ".gif" else fps
+
+
+def write(out: Path, pictures: Iterator[Picture], fps: float) -> None:
+    """Write pictures of one size as a file, whole or not at all; PNG takes the first one.
+
+    Raises:
+        OptionError: as of `check`.
+    """
+    check(out)
+    writers: dict[str, Callable[[Path, Iterator[Picture], float], None]] = {
+        ".gif": _gif, ".webp": _webp, ".png": _png
+    }  # fmt: skip
+    out.parent.mkdir(parents=True, exist_ok=True)
+    part = out.with_name(f".{out.stem}.part{out.suffix}")
+    try:
+        writers.get(out.suffix, _encode)(part, pictures, fps)
+        os.replace(part, out)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _encode(out: Path, pictures: Iterator[Picture], fps: float) -> None:
+    library, first = _ffmpeg(out), next(pictures)
+    height, width, _ = first.shape
+    pipe = library.write_frames(
+        str(out), (width, height), fps=fps, codec=None, quality=None, macro_block_size=2,
+        ffmpeg_log_level="error", output_params=CODECS[out.suffix],
+    )  # fmt: skip
+    pipe.send(None)
+    try:
+        pipe.send(np.ascontiguousarray(first))
+        for picture in pictures:
+            pipe.send(np.ascontiguousarray(picture))
+    finally:
+        pipe.close()
+
+
+def _gif(out: Path, pictures: Iterator[Picture], fps: float) -> None:
+    """With one palette for all pictures, so that still parts stay still: rare colours of any of them are in it."""
+    frames = [Image.fromarray(picture) for picture in pictures]
+    sample = np.concatenate([np.asarray(frame) for frame in frames[:: -(-len(frames) // SAMPLED)] + frames[-1:]])
+    palette = Image.fromarray(sample).quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
+    first, *rest = (frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
+    first.save(out, save_all=True, append_images=rest, duration=1000 / fps, loop=0, optimize=True)
+
+
+def _webp(out: Path, pictures: Iterator[Picture], fps: float) -> None:
+    first, rest = Image.fromarray(next(pictures)), [Image.fromarray(picture) for picture in pictures]
+    first.save(out, save_all=True, append_images=rest, duration=round(1000 / fps), loop=0, quality=QUALITY, method=4)
+
+
+def _png(out: Path, pictures: Iterator[Picture], _fps: float) -> None:
+    Image.fromarray(next(pictures)).save(out, optimize=True)
+
+
+def _ffmpeg(out: Path) -> Any:
+    """The library that brings ffmpeg."""
+    try:
+        import imageio_ffmpeg
+
+        imageio_ffmpeg.get_ffmpeg_exe()
+    except (ImportError, RuntimeError) as error:
+        allowed = ".gif, .webp or .png, or any video after: pip install 'artde-gym[video]' (it brings ffmpeg)"
+        raise OptionError("out", str(out), allowed) from error
+    return imageio_ffmpeg

@@ -1,0 +1,55 @@
+"""Markdown as prose and blocks of code: what runs in the tests, and what notebooks are made of."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from typing import NamedTuple
+
+FENCE = re.compile(r"^```[ ]*(?P<language>\w*)[^\n]*\n(?P<text>.*?)^```[ ]*$", re.DOTALL | re.MULTILINE)
+NOT_RUN = re.compile(r"<!-- not run: (?P<reason>.+?) -->\s*\Z")
+
+
+SHELL = ["bash", "-euo", "pipefail", "-c"]
+
+
+class Block(NamedTuple):
+    """Prose (language "markdown"), or code in a language; `reason` says why code is not run, if it is not."""
+
+    language: str
+    text: str
+    reason: str = ""
+
+
+def blocks(markdown: str) -> list[Block]:
+    """The parts of a page in their order."""
+    found, end = [], 0
+    for fence in FENCE.finditer(markdown):
+        prose = markdown[end : fence.start()]
+        excuse = NOT_RUN.search(prose)
+        found.append(Block("markdown", NOT_RUN.sub("", prose)))
+        found.append(Block(fence["language"], fence["text"], excuse["reason"] if excuse else ""))
+        end = fence.end()
+    return [*found, Block("markdown", markdown[end:])]
+
+
+def script(parts: list[Block]) -> str:
+    """All Python and shell blocks that run, in their order, as one Python script; a failing command ends it."""
+    lines = []
+    for part in parts:
+        if part.language == "python" and not part.reason:
+            lines.append(part.text)
+        elif part.language == "sh" and not part.reason:
+            lines.append(f"import subprocess\n\nsubprocess.run({[*SHELL, part.text]!r}, check=True)\n")
+    return "\n".join(lines)
+
+
+def commands(markdown: str) -> list[list[str]]:
+    """The words after `artde-gym` of all its calls, in shell blocks, indented lines and code spans."""
+    shell = [part.text for part in blocks(markdown) if part.language == "sh"]
+    prose = [part.text for part in blocks(markdown) if part.language == "markdown"]
+    lines = [line for text in shell for line in text.replace("\\\n", " ").splitlines()]
+    indented = [line.strip() for text in prose for line in text.replace("\\\n", " ").splitlines() if line[:4] == "    "]
+    spans = [span.replace("\n", " ") for text in prose for span in re.findall(r"`([^`]+)`", text)]
+    calls = [shlex.split(line, comments=True) for line in (*lines, *indented, *spans) if line.startswith("artde-gym ")]
+    return [call[1:] for call in calls]

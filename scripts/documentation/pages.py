@@ -1,0 +1,100 @@
+"""Pages that have their source in the code, or elsewhere in the repository."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+from gymnasium.envs.registration import load_env_creator
+
+import artde_gym  # noqa: F401  # registers the environments
+from artde_gym.evaluation import SCENARIOS
+from artde_gym.evaluation.environments import ours, robot_of
+from artde_gym.registration import registered_controllers
+from controllers.presets import PRESETS
+
+ROOT = Path(__file__).parents[2]
+RAISES = re.compile(r"^Raises:\n((?:    .*\n?)+)", re.MULTILINE)
+EXAMPLE = """\
+```python
+import gymnasium as gym
+import artde_gym
+import controllers
+
+env = gym.make("{env_id}", duration=2.0)
+policy = controllers.make("artde", env)
+observation, info = env.reset(seed=0)
+action, state = policy.predict(observation)
+observation, reward, terminated, truncated, info = env.step(action)
+print(info["reward_terms"])
+```
+"""
+
+
+def generated() -> dict[str, str]:
+    """Path in docs/ -> Markdown."""
+    pages = {f"environments/{env_id}.md": environment(env_id) for env_id in ours()}
+    pages |= {f"policies/{card.parent.name}.md": card.read_text(encoding="utf-8") for card in cards()}
+    pages["results.md"] = _part_of_readme("What holds so far")
+    pages["changelog.md"] = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    return pages
+
+
+def cards() -> list[Path]:
+    """The model cards of the policies that are shipped."""
+    return sorted((ROOT / "baselines/policies").glob("*/README.md"))
+
+
+def environment(env_id: str) -> str:
+    """The page of an environment: its docstring, then what the registries know of it."""
+    spec, robot = gym.spec(env_id), robot_of(env_id)
+    page = _page(load_env_creator(str(spec.entry_point)))
+    parts = [f"# {env_id}", page, "## Example", EXAMPLE.format(env_id=env_id)]
+    scenarios = [
+        f"| {entry.name} | {entry.text} | `{json.dumps(dict(entry.kwargs))}` |"
+        for entry in SCENARIOS.values()
+        if entry.env_id == env_id
+    ]
+    if scenarios:
+        parts += ["## Scenarios", "\n".join(["| scenario | what it is | arguments |", "|---|---|---|", *scenarios])]
+    parts += ["## Controllers", "Gains of the robot's presets, a controller's first one its default.", _presets(robot)]
+    if spec.vector_entry_point:
+        own = [part for part in _sections(_page(load_env_creator(str(spec.vector_entry_point)))) if part not in page]
+        parts += ["## The vector environment", *(part.replace("## ", "### ", 1) for part in own)]
+    return "\n\n".join(parts) + "\n"
+
+
+def _page(documented: Any) -> str:
+    text = inspect.cleandoc(str(documented.__doc__))
+    text = RAISES.sub(
+        lambda found: "## Errors\n\n" + re.sub(r"^ +(\w+):", r"- `\1`:", found[1], flags=re.MULTILINE), text
+    )
+    return re.sub(r"\bdocs/(\w+)\.md\b", r"[\1](../\1.md)", text)
+
+
+def _sections(page: str) -> list[str]:
+    """What stands before the first head, and each section with its head."""
+    return [part.strip() for part in re.split(r"^(?=## )", page, flags=re.MULTILINE)]
+
+
+def _presets(robot: str) -> str:
+    texts = {name: spec.text for name, spec in registered_controllers().items()}  # of their default presets
+    rows = ["| controller | what it is | preset | source of its gains |", "|---|---|---|---|"]
+    rows += [
+        f"| `{law}` | {texts.pop(law, '')} | `{preset}` | {entry.source} |"
+        for (law, preset), entry in PRESETS[robot].items()
+    ]
+    return "\n".join(rows)
+
+
+def _part_of_readme(title: str) -> str:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    found = re.search(rf"^## {title}\n(.*?)(?=^## )", text, re.DOTALL | re.MULTILINE)
+    if found is None:
+        raise ValueError(f"README.md has no part {title!r}")
+    body = found[1].replace("](docs/", "](")
+    return f"# {title}\n{body}"

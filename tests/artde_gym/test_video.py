@@ -1,0 +1,181 @@
+"""Videos as their viewers have them: read back from the files, frame by frame."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.wrappers import RecordVideo
+from PIL import Image
+from typer.testing import CliRunner
+
+import artde_gym  # noqa: F401  (registers the environments)
+import controllers
+from artde_gym.cli import app
+from artde_gym.errors import OptionError, UnknownNameError
+from artde_gym.evaluation import evaluate
+from artde_gym.evaluation.film import video
+from artde_gym.evaluation.film.panels import FALLEN, panels
+from artde_gym.evaluation.film.shots import Shot, shots
+from artde_gym.evaluation.film.writer import frame_rate
+from artde_gym.evaluation.palette import LOOKS
+from artde_gym.registration import registered_controllers
+
+WALK = "BipedWalk-Payload-v0"
+SHOVE = {"body": "chest", "magnitude": 80.0, "direction": [1.0, 0.0, 0.0], "start": 0.2, "duration": 0.2}
+FALL: dict[str, Any] = {"disturbances": {"push": [SHOVE]}, "env_kwargs": {"duration": 3.0, "control_period": 0.004}}
+FLIGHT: dict[str, Any] = {"env_kwargs": {"duration": 2.0}, "disturbances": {"payload": 0.35}}
+
+
+def frames(path: Path) -> list[np.ndarray]:
+    """Of a GIF or a WebP."""
+    with Image.open(path) as film:
+        return [np.array(_at(film, number).convert("RGB")) for number in range(getattr(film, "n_frames", 1))]
+
+
+def _at(film: Any, number: int) -> Any:
+    film.seek(number)
+    return film
+
+
+def decoded(path: Path) -> tuple[dict[str, Any], Iterator[bytes]]:
+    """What ffmpeg says of a video, and its frames."""
+    library = pytest.importorskip("imageio_ffmpeg")
+    reader = library.read_frames(str(path))
+    return next(reader), reader
+
+
+def near(picture: np.ndarray, colour: str | tuple[int, ...], tolerance: int = 30) -> np.ndarray:
+    wanted = [int(colour[i : i + 2], 16) for i in (1, 3, 5)] if isinstance(colour, str) else colour
+    return np.abs(picture.astype(int) - wanted).max(axis=-1) < tolerance
+
+
+def test_shots_are_of_the_episode_that_evaluate_runs() -> None:
+    """Its fall comes at the same time, and pictures at the first samples from the wanted times on."""
+    row = evaluate(["tde"], WALK, episodes=1, seed=5, **FALL).episodes.iloc[0]
+    kwargs = {**FALL["env_kwargs"], "disturbances": FALL["disturbances"]}
+    spec = registered_controllers()["tde"]
+    seen = list(shots(WALK, kwargs, spec, {}, int(row["seed"]), [0.0, 0.1, 0.25, 9.0, 10.0], 64))
+    assert [shot.time_s for shot in seen] == pytest.approx([0.0, 0.1, 0.252, row["time_to_fall_s"]])
+    assert [shot.over for shot in seen] == [False, False, False, True]
+    assert seen[-1].fall_reason == row["fall_reason"]
+    assert all(shot.picture.shape == (48, 64, 3) for shot in seen)
+
+
+@pytest.mark.parametrize("suffix", [".gif", ".webp"])
+def test_two_controllers_side_by_side_with_their_fall(tmp_path: Path, suffix: str) -> None:
+    out = video(["tde", "artde"], tmp_path / f"x{suffix}", WALK, width=160, fps=10.0, **FALL)
+    film = frames(out)
+    first, last = film[0], film[-1]
+    height, width, _ = first.shape
+    assert width == 2 * 160 + 4
+    assert height % 2 == 0
+    for number, name in enumerate(("tde", "artde")):
+        part = np.s_[20:42, number * 164 : number * 164 + 80]
+        assert near(first[part], LOOKS[name].colour, 60).sum() > 10
+        panel = np.s_[45:, number * 164 : number * 164 + 160]
+        assert near(last[panel], FALLEN).sum() > 300  # its frame
+        assert not near(first[panel], FALLEN).sum() > 10
+    assert not np.array_equal(first, film[3])
+
+
+def test_mp4_has_the_length_of_the_part_that_is_shown(tmp_path: Path) -> None:
+    pytest.importorskip("imageio_ffmpeg")
+    out = video(
+        ["tde"], tmp_path / "new" / "x.mp4", "QuadInfinity-Payload-v0", start=0.5, end=1.5, fps=20.0, width=96, **FLIGHT
+    )
+    meta, pictures = decoded(out)
+    assert meta["fps"] == 20
+    assert meta["duration"] == pytest.approx(1.0, abs=0.06)
+    assert meta["source_size"][0] == 96
+    assert len(list(pictures)) == 20
+    slow = video(
+        ["tde"], tmp_path / "slow.webm", "QuadInfinity-Payload-v0", end=0.5, speed=0.5, fps=20.0, width=96, **FLIGHT
+    )
+    assert decoded(slow)[0]["duration"] == pytest.approx(1.0, abs=0.06)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["new", "slow.webm"]
+
+
+def test_png_is_one_picture_and_the_same_each_time(tmp_path: Path) -> None:
+    arguments: dict[str, Any] = {"start": 1.0, "width": 160, "seed": 2, "episode": 1, **FLIGHT}
+    one, two = (video(["pid"], tmp_path / name, "QuadInfinity-Payload-v0", **arguments) for name in ("a.png", "b.png"))
+    assert one.read_bytes() == two.read_bytes()
+    assert frames(one)[0].shape[1] == 160
+
+
+def test_panels_freeze_who_has_ended_and_fill_rows() -> None:
+    grey, red = np.full((60, 80, 3), 128, np.uint8), np.full((60, 80, 3), (220, 40, 40), np.uint8)
+    walks, fell = Shot(1.5, grey, False, ""), Shot(1.25, red, True, "tilt")
+    page = panels({"tde": fell, "atde": walks, "artde": walks}, "title", 2)
+    assert page.shape[0] % 2 == page.shape[1] % 2 == 0
+    assert page.shape[1] == 164
+    panel = page[20 + 20 :][:60, :80]
+    middle = panel[30, 40].astype(int)
+    assert middle.max() - middle.min() < 80 < 180  # paler than it was
+    assert near(panel[:2], FALLEN).all()
+    assert (page[-62:-4, 84:] > 250).all()  # the fourth place is free
+
+
+def test_a_gif_counts_in_hundredths_of_a_second() -> None:
+    assert frame_rate(Path("x.gif"), 30.0) == pytest.approx(100 / 3)
+    assert frame_rate(Path("x.gif"), 1000.0) == 50.0
+    assert frame_rate(Path("x.webp"), 30.0) == 30.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"out": "x.avi"}, "x.avi.*mp4.*gif"),
+        ({"start": -1.0}, "start is -1.0"),
+        ({"start": 2.0, "end": 1.0}, "end is 1.0"),
+        ({"speed": 0.0}, "speed is 0.0"),
+        ({"fps": float("nan")}, "fps is nan"),
+        ({"columns": 0}, "columns is 0"),
+        ({"width": 3}, "width is 3"),
+    ],
+)
+def test_bad_arguments_name_field_value_and_what_is_allowed(
+    tmp_path: Path, arguments: dict[str, Any], words: str
+) -> None:
+    given: dict[str, Any] = {"out": "x.gif", **arguments}
+    with pytest.raises(OptionError, match=words):
+        video(["tde"], tmp_path / given.pop("out"), "QuadInfinity-Payload-v0", **given)
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(UnknownNameError, match="tdee"):
+        video(["tdee"], tmp_path / "x.gif")
+
+
+def test_without_ffmpeg_one_clear_line(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    answer = CliRunner().invoke(app, ["video", "--out", str(tmp_path / "x.mp4")])
+    assert isinstance(answer.exception, OptionError)
+    assert "artde-gym[video]" in str(answer.exception)
+    assert ".gif" in str(answer.exception)
+
+
+def test_command(tmp_path: Path) -> None:
+    out = tmp_path / "x.webp"
+    line = f"video --env QuadInfinity-Payload-v0 --controllers tde,pid --end 0.3 --fps 10 --width 96 --out {out}"
+    answer = CliRunner().invoke(app, line.split())
+    assert answer.exit_code == 0, answer.output
+    assert len(frames(out)) == 3
+
+
+def test_gymnasium_records_at_the_pace_of_the_simulation(tmp_path: Path) -> None:
+    pytest.importorskip("moviepy")
+    env = gym.make(WALK, disable_env_checker=True, render_mode="rgb_array", width=160, height=120, duration=0.5)
+    env = RecordVideo(env, str(tmp_path / "videos"))
+    policy, state, over = controllers.make("tde", env), None, False
+    observation, _ = env.reset(seed=0)
+    while not over:
+        action, state = policy.predict(observation, state)
+        observation, _, terminated, truncated, _ = env.step(action)
+        over = terminated or truncated
+    env.close()
+    meta, _ = decoded(tmp_path / "videos" / "rl-video-episode-0.mp4")
+    assert meta["duration"] == pytest.approx(0.5, abs=0.02)
