@@ -33,7 +33,7 @@ LABELS = {"cma-es": "balance"}
 
 @dataclasses.dataclass(frozen=True)
 class Training:
-    """What is trained; the same configuration continues its run.
+    """What is trained; the same configuration continues its run, also with more steps or other options.
 
     Attributes:
         env_id: of the environment.
@@ -185,7 +185,7 @@ def single(env_id: str, kwargs: dict[str, Any], recipe: Recipe) -> ResidualEnv:
 
 
 def _claim(folder: Path, configuration: dict[str, Any]) -> None:
-    """Make a folder this run's, or see that it is. A longer run may continue a shorter one."""
+    """Make a folder this run's, or see that it is; its steps and the algorithm's options may change on the way."""
     file = folder / "run.json"
     if not file.exists():
         folder.mkdir(parents=True, exist_ok=True)
@@ -193,7 +193,7 @@ def _claim(folder: Path, configuration: dict[str, Any]) -> None:
         return
     before = json.loads(file.read_text())["configuration"]
     for name, value in configuration.items():
-        if name != "steps" and before.get(name) != value:
+        if name not in ("steps", "options") and before.get(name) != value:
             raise TrainingError(f"{name} of the run in {folder}", value, f"{before.get(name)!r}, or another folder")
 
 
