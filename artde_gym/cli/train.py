@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from artde_gym.cli.arguments import Engine, EnvKwargs, Seed, environment_kwargs, json_object, processes
+from artde_gym.cli.arguments import Engine, EnvKwargs, Report, Seed, environment_kwargs, json_object, processes
+from artde_gym.cli.report import show_report
 from artde_gym.errors import OptionError
 
 
@@ -28,6 +30,7 @@ def train(
     engine: Engine = None,
     env_kwargs: EnvKwargs = None,
     options: Annotated[str | None, typer.Option(help="JSON, arguments of the algorithm.")] = None,
+    report: Report = False,
 ) -> None:
     """Train a residual on a controller; killed at any moment, the same command continues from its last checkpoint."""
     from baselines.recipe import Recipe  # torch is heavy, and may not be installed
@@ -66,3 +69,5 @@ def train(
 
         policy = go(training, out, on_progress)
     print(f"best policy: {policy}")
+    if report:
+        show_report(out, Console())

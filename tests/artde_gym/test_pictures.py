@@ -179,7 +179,8 @@ def test_words_and_size_are_the_users() -> None:
     assert changed[0].min() > 190  # in the lower left corner
     assert changed[1].max() < 160
     env.close()
-    for wrong in ({"width": 0}, {"height": 99999}, {"width": 12.5}):
+    cases: list[dict[str, Any]] = [{"width": 0}, {"height": 99999}, {"width": 12.5}]
+    for wrong in cases:
         with pytest.raises(OptionError, match="16 to 4096"):
             make(duration=1.0, **wrong)
 

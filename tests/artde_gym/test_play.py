@@ -72,7 +72,7 @@ def turns(played: Session, seconds: float) -> None:
 def test_an_episode_that_is_only_watched_is_that_of_evaluate() -> None:
     played, screen, plant = session()
     turns(played, 1.0)
-    env = gym.make("BipedWalk-Payload-v0", disable_env_checker=True, **WALK)
+    env: Any = gym.make("BipedWalk-Payload-v0", disable_env_checker=True, **WALK)
     policy, state = controllers.make("tde", env), None
     observation, _ = env.reset(seed=0)
     for _ in range(250):

@@ -20,6 +20,7 @@ from stable_baselines3.common.vec_env import VecMonitor
 
 import artde_gym  # noqa: F401  # registers the environments
 from artde_gym.errors import OptionError
+from artde_gym.evaluation.report import write_report
 from baselines.errors import TrainingError
 from baselines.export import exported
 from baselines.recipe import Recipe
@@ -119,6 +120,16 @@ def test_a_folder_belongs_to_one_configuration(tmp_path, quick):
         Run(small(seed=4), tmp_path)
     with pytest.raises(TrainingError, match=r"algo is 'pqo'; allowed: cma-es, ppo, sac \(did you mean 'ppo'"):
         small("pqo")
+
+
+def test_a_training_has_a_report(tmp_path, quick):
+    train(small(steps=192), tmp_path)
+    curve = (tmp_path / "learning_curve.csv").read_text().splitlines()
+    text = write_report(tmp_path).read_text()
+    assert f"Best of {len(curve) - 1} held-out tests" in text
+    assert "tde+ppo in QuadInfinity-Payload-v0: attitude channel" in text
+    for column in curve[0].split(","):
+        assert f">{column}</button>" in text
 
 
 def test_numpy_inference_equals_torch(tmp_path, quick):

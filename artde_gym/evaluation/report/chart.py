@@ -19,7 +19,7 @@ from artde_gym.arrays import Array
 from artde_gym.evaluation.palette import Look
 
 COLUMNS = 220
-LEFT, RIGHT, TOP, BOTTOM = 58, 12, 12, 40  # margins of the drawing, in its own units
+LEFT, RIGHT, TOP, BOTTOM = 64, 12, 12, 40  # margins of the drawing, in its own units
 TICKS = 5
 
 SHAPES: dict[str, str] = {
@@ -162,9 +162,11 @@ class Chart:
             return
         (first, last), _ = self._points([begin, min(end, self.x.high)], [self.y.low] * 2)
         size = self.height - TOP - BOTTOM
+        late = first > 0.8 * self.width  # no room for words on its right
+        place = f'x="{first - 4:.1f}" text-anchor="end"' if late else f'x="{first + 4:.1f}"'
         self._parts.append(
             f'<g class="event"><rect x="{first:.1f}" y="{TOP}" width="{max(last - first, 1.5):.1f}" height="{size}"/>'
-            f'<text x="{first + 4:.1f}" y="{TOP + 10}">{escape(text)}</text></g>'
+            f'<text {place} y="{TOP + 10}">{escape(text)}</text></g>'
         )
 
     def level(self, y: float, text: str, look: Look | None = None) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 from artde_gym.errors import StoreError
 from artde_gym.evaluation.environments import robot_of
 from artde_gym.evaluation.frontier import RECORD
-from artde_gym.evaluation.report import biped, diagram, flight, frontier_page, signals, tables
+from artde_gym.evaluation.report import biped, diagram, flight, frontier_page, signals, tables, training_page
 from artde_gym.evaluation.report.answer import headline, sentences
 from artde_gym.evaluation.report.html import bullets, page, paragraph, section
 from artde_gym.evaluation.report.laws import Laws, unavailable
@@ -28,10 +28,10 @@ _LAST = ("Reference and loop", "Provenance")
 def write_report(
     folder: str | Path, *, pictures: bool = False, videos: bool = False, on_progress: Progress = lambda _: None
 ) -> Path:
-    """Write the report of an evaluation or a frontier into its folder; a run that was interrupted has one, too.
+    """Write the report of an evaluation, a frontier or a training into its folder; an interrupted one has one, too.
 
     Args:
-        folder: what `evaluate` or `frontier` wrote.
+        folder: what `evaluate`, `reproduce`, `frontier` or `train` wrote.
         pictures: of an evaluation: whether to run the shown episodes again for pictures of motion, pushes and falls.
         videos: likewise, for a video of each scenario (about a megabyte each).
         on_progress: called with what is being drawn.
@@ -44,9 +44,11 @@ def write_report(
     """
     folder = Path(folder)
     if not folder.is_dir():
-        raise StoreError("results folder", str(folder), "a folder that `evaluate` or `frontier` wrote")
+        raise StoreError("results folder", str(folder), "a folder that `evaluate`, `frontier` or `train` wrote")
     if (folder / RECORD).exists():
         text = _frontier(folder)
+    elif (folder / training_page.RECORD).exists():
+        text = _training(training_page.read_training(folder))
     else:
         run = Run.read(folder)
         text = _evaluation(run, Album(run, pictures, videos, on_progress))
@@ -135,6 +137,15 @@ def _frontier(folder: Path) -> str:
     return page(f"artde-gym: {title}", body)
 
 
+def _training(run: training_page.Trained) -> str:
+    head, lines = training_page.answer(run)
+    title = f"Training of {run.name} in {run.record['configuration']['env_id']}"
+    body = [f"<h1>{escape(title)}</h1>", _answer(head, {"": lines}), *training_page.parts(run)]
+    packages = {"packages": ", ".join(f"{name} {version}" for name, version in run.record["versions"].items())}
+    body.append(_anchored("Provenance", _facts(packages, run.record["configuration"])))
+    return page(f"artde-gym: {title}", body)
+
+
 def _answer(head: str, said: Mapping[str, list[str]]) -> str:
     parts = [f"<p><strong>{escape(head)}</strong></p>"]
     for name, lines in said.items():
@@ -165,8 +176,12 @@ def _origin(record: Mapping[str, Any]) -> str:
         "Python": f"{origin['python']} on {origin['platform']}",
         "packages": ", ".join(f"{name} {version}" for name, version in origin["packages"].items()),
     }
+    return _facts(facts, record["configuration"])
+
+
+def _facts(facts: Mapping[str, str], configuration: Mapping[str, Any]) -> str:
     rows = "".join(f"<dt>{escape(key)}</dt><dd><code>{escape(str(value))}</code></dd>" for key, value in facts.items())
-    whole = escape(json.dumps(record["configuration"], indent=1))
+    whole = escape(json.dumps(configuration, indent=1))
     return (
         f"<dl>{rows}</dl><details><summary>Full configuration</summary>"
         '<div class="scroll" role="region" aria-label="Full configuration" tabindex="0">'

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
 from artde_gym.evaluation import evaluate, frontier
@@ -18,7 +20,9 @@ def walks(tmp_path_factory):
     arguments = {"episodes": 2, "out": folder, "env_kwargs": SHORT}
     result = evaluate(["tde", "artde"], scenario="S1", disturbances={"push": [push]}, **arguments)
     judge(result, [claim for claim in CLAIMS if claim.scenario == "S1"]).to_csv(folder / "claims.csv", index=False)
-    write_report(folder)
+    arguments |= {"out": folder / "ablation" / "S1", "gains": {"tde+kd": {"c": 5.0}}}
+    evaluate(["tde+kd"], scenario="S1", disturbances={"push": [push]}, **arguments)
+    write_report(folder, pictures=True)
     return folder
 
 
@@ -29,7 +33,7 @@ def flights(tmp_path_factory):
     kwargs = {"duration": 4.0}
     arguments = {"disturbances": disturbances, "env_kwargs": kwargs, "out": folder}
     evaluate(["tde", "atde", "artde"], "QuadInfinity-Payload-v0", episodes=2, **arguments)
-    write_report(folder)
+    write_report(folder, pictures=True)
     return folder
 
 
@@ -38,5 +42,18 @@ def bracket(tmp_path_factory):
     folder = tmp_path_factory.mktemp("frontier") / "run"
     arguments = {"low": 1.0, "high": 3.0, "tolerance": 1.0, "episodes": 1, "env_kwargs": {"duration": 2.0}}
     frontier(["artde"], "QuadInfinity-Payload-v0", "payload.mass", disturbances={}, out=folder, **arguments)
+    write_report(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def training(tmp_path_factory):
+    """As a training leaves it behind."""
+    folder = tmp_path_factory.mktemp("training")
+    recipe = {"robot": "q450", "base": "tde", "channel": "attitude"}
+    configuration = {"env_id": "QuadInfinity-Payload-v0", "recipe": recipe, "algo": "ppo", "steps": 4000000, "seed": 0}
+    (folder / "run.json").write_text(json.dumps({"configuration": configuration, "versions": {"numpy": "2"}}))
+    rows = ["steps,score,fell,rmse_m", "1000000,-0.05,0.5,0.05", "2000000,-0.01,0,0.01", "3000000,-0.02,0.25,0.02"]
+    (folder / "learning_curve.csv").write_text("\n".join(rows) + "\n")
     write_report(folder)
     return folder

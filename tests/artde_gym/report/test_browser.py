@@ -19,7 +19,7 @@ HIDDEN = """
 }).length"""
 
 
-@pytest.fixture(params=["walks", "flights", "bracket"])
+@pytest.fixture(params=["walks", "flights", "bracket", "training"])
 def report(request):
     return request.getfixturevalue(request.param) / "report.html"
 

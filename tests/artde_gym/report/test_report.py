@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import base64
 import html.parser
+import io
 import json
 import re
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from PIL import Image
 from typer.testing import CliRunner
 
 from artde_gym.cli import app
+from artde_gym.envs.view import PUSH
 from artde_gym.errors import StoreError
 from artde_gym.evaluation.palette import Look
 from artde_gym.evaluation.report import write_report
@@ -59,7 +64,7 @@ def test_one_file_without_network_whose_charts_have_names(walks, flights, bracke
 
 def test_the_same_folder_gives_the_same_bytes(flights):
     before = (flights / "report.html").read_bytes()
-    write_report(flights)
+    write_report(flights, pictures=True)
     assert (flights / "report.html").read_bytes() == before
 
 
@@ -81,12 +86,109 @@ def test_everything_of_the_biped_and_of_the_quadrotor_is_there(walks, flights):
         assert [word for word in [*shared, *words] if word not in text] == []
 
 
+def pictures_of(path: Path) -> dict[str, np.ndarray]:
+    """Pictures of a page by what they say that they show."""
+    found = {}
+    for image in Reader(path).of("img"):
+        kind, data = str(image["src"]).split(",", 1)
+        assert kind == "data:image/webp;base64"
+        found[str(image["alt"])] = np.array(Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB"))
+    return found
+
+
+def test_pictures_of_the_walk_of_pushes_and_of_falls(walks):
+    """Of the episode whose signals are plotted: what falls at a time is upright a second before."""
+    rows = Run.read(walks).result.episodes.query("episode == 0").set_index("controller")
+    seen = pictures_of(walks / "report.html")
+    assert all(picture.shape == (240, 320, 3) for picture in seen.values())
+    fallen = [name for name in rows.index if rows.loc[name, "fell"]]
+    assert fallen
+    for name in fallen:
+        strip = [text for text in seen if text.startswith(f"The fall of {name}: ")]
+        assert strip[-1] == f"The fall of {name}: at {rows.loc[name, 'time_to_fall_s']:.2f} s"
+        assert len(strip) >= 3
+    assert sum("The walk under" in text for text in seen) == 6
+    pushed = next(
+        text for text in seen if text.startswith("push0 at 0.5 s (60 N on chest)") and "in the middle" in text
+    )
+    red = np.abs(seen[pushed].astype(int) - PUSH).max(axis=-1) < 40
+    assert red.sum() > 100  # an arrow
+    assert (walks / "report.html").stat().st_size < 2e6
+
+
+def test_pictures_of_the_flight_and_of_the_drop(flights):
+    seen = pictures_of(flights / "report.html")
+
+    def orange(end: str) -> int:
+        text = next(text for text in seen if text.startswith("drop at 2 s") and text.endswith(end))
+        picture = seen[text].astype(int)
+        return int((picture[..., 0] > picture[..., 2] + 80).sum())
+
+    before, after = orange("before"), orange("0.8 s after")
+    assert before > 40
+    assert after < before / 3
+    assert sum("The flight under" in text for text in seen) == 6
+
+
+def test_a_run_that_does_not_repeat_is_not_shown(walks, tmp_path):
+    folder = tmp_path / "run"
+    shutil.copytree(walks, folder)
+    frame = pd.read_csv(folder / "episodes.csv")
+    frame["time_to_fall_s"] += 0.05  # as if another machine had run it
+    frame.to_csv(folder / "episodes.csv", index=False)
+    text = write_report(folder, pictures=True).read_text(encoding="utf-8")
+    assert "did not repeat the stored episode" in text
+    assert "The fall of tde:" not in text
+    assert "The fall of tde+kd:" in text  # whose table was left alone
+
+
+def test_what_cannot_be_drawn_is_one_sentence_and_the_rest_is_there(flights, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    folder = tmp_path / "run"
+    shutil.copytree(flights, folder)
+    text = write_report(folder, videos=True).read_text(encoding="utf-8")
+    assert text.count("Nothing is drawn here: ") == 1
+    assert "artde-gym[video]" in text
+    assert "Tracking error" in text
+
+
+def test_the_ablation_stands_beside_the_others(walks):
+    run = Run.read(walks)
+    assert run.result.controllers == ["tde", "artde", "tde+kd"]
+    assert len(run.result.rows("S1", "tde+kd")) == 2
+    episode = run.episode("S1")
+    assert episode is not None
+    assert list(episode.signals) == ["tde", "artde", "tde+kd"]
+    assert Laws(run).gains("S1")["tde+kd"]["c"] == 5.0
+
+
+def test_what_follows_a_push_is_a_table_of_the_stored_numbers(walks):
+    frame = pd.read_csv(walks / "episodes.csv")
+    text = (walks / "report.html").read_text(encoding="utf-8")
+    table = text[text.index("after pushes and drops") :]
+    peaks = frame.loc[frame["controller"] == "tde", "peak_error_deg_push0"]
+    assert f'data-v="{peaks.mean():.9g}"' in table
+    assert "never recovered" in table
+
+
+def test_a_training_says_which_test_was_the_best(training, tmp_path):
+    text = (training / "report.html").read_text(encoding="utf-8")
+    assert "Best of 3 held-out tests: score -0.01 after 2 million decisions." in text
+    assert "Tests since that were no better: 1, the last one -0.02" in text
+    assert "50 % in the first test, 0 % in the best" in text
+    shutil.copytree(training, tmp_path / "run")
+    (tmp_path / "run" / "learning_curve.csv").write_text("steps,score\n")
+    with pytest.raises(StoreError, match="held-out test"):
+        write_report(tmp_path / "run")
+
+
 def test_an_interrupted_run_has_a_report(walks, tmp_path):
     folder = tmp_path / "run"
     shutil.copytree(walks, folder)
     whole = (folder / "episodes.csv").read_text().splitlines(keepends=True)
     (folder / "episodes.csv").write_text("".join(whole[:2]) + whole[2][:40])  # the second row is being written
     (folder / "claims.csv").unlink()
+    shutil.rmtree(folder / "ablation")
     text = write_report(folder).read_text(encoding="utf-8")
     assert "Interrupted or still running" in text
     assert "there is nothing to compare it with" in text
