@@ -20,7 +20,7 @@ CHECKS: dict[str, tuple[str, str]] = {
     "files": ("Files", "artde_gym.doctor.machine:files"),
     "bullet": ("Environments in PyBullet", "artde_gym.doctor.environments:bullet"),
     "mujoco": ("Environments in MuJoCo", "artde_gym.doctor.environments:mujoco"),
-    "batch": ("Environments in NumPy", "artde_gym.doctor.environments:batch"),
+    "batch": ("Many environments at once", "artde_gym.doctor.environments:batch"),
     "sb3": ("Stable-Baselines3", "artde_gym.doctor.environments:stable_baselines3"),
     "determinism": ("Determinism", "artde_gym.doctor.determinism:determinism"),
     "validity": (
