@@ -15,6 +15,7 @@ import gymnasium as gym
 import numpy as np
 
 import artde_gym
+from artde_gym.arguments import reading
 from artde_gym.errors import among
 from artde_gym.evaluation import evaluate
 from baselines.errors import TrainingError
@@ -33,7 +34,7 @@ LABELS = {"cma-es": "balance"}
 
 @dataclasses.dataclass(frozen=True)
 class Training:
-    """What is trained; the same configuration continues its run.
+    """What is trained; the same configuration continues its run, also with more steps or other options.
 
     Attributes:
         env_id: of the environment.
@@ -185,15 +186,16 @@ def single(env_id: str, kwargs: dict[str, Any], recipe: Recipe) -> ResidualEnv:
 
 
 def _claim(folder: Path, configuration: dict[str, Any]) -> None:
-    """Make a folder this run's, or see that it is. A longer run may continue a shorter one."""
+    """Make a folder this run's, or see that it is; its steps and the algorithm's options may change on the way."""
     file = folder / "run.json"
     if not file.exists():
         folder.mkdir(parents=True, exist_ok=True)
         file.write_text(json.dumps({"configuration": configuration, "versions": versions()}, indent=1))
         return
-    before = json.loads(file.read_text())["configuration"]
+    with reading("run", file, "a file that `train` wrote", TrainingError):
+        before = dict(json.loads(file.read_text(encoding="utf-8"))["configuration"])
     for name, value in configuration.items():
-        if name != "steps" and before.get(name) != value:
+        if name not in ("steps", "options") and before.get(name) != value:
             raise TrainingError(f"{name} of the run in {folder}", value, f"{before.get(name)!r}, or another folder")
 
 

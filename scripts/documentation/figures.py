@@ -40,10 +40,8 @@ def tde() -> str:
     runs = {"tde": arm("tde"), "feedback alone": simulate(LAWS["positional-pid"].law, feedback, ARM, ARM_PERIOD)}
     periods = {f"L = {1e3 * period:g} ms": arm("tde", period=period) for period in (0.001, 0.002, 0.004)}
     charts = {
-        "with and without the estimate": over_time(
-            "|e| (deg)", {name: size(run) for name, run in runs.items()}, log=True
-        ),
-        "error and sampling period": over_time("e (deg)", {name: error(run) for name, run in periods.items()}),
+        "with and without the estimate": errors(runs, log=True),
+        "error and sampling period": errors(periods),
         "when it converges": _validity(),
     }
     caption = (
@@ -57,7 +55,7 @@ def tde() -> str:
 def atde() -> str:
     runs = {name: arm(name) for name in ("tde", "atde")}
     charts = {
-        "error": over_time("e (deg)", {name: error(run) for name, run in runs.items()}),
+        "error": errors(runs),
         "gain c": over_time("c (rad/s^2)", {"atde": inside(runs["atde"], "c")}),
         "sliding variable": over_time("|s| (1)", {"atde": inside(runs["atde"], "s")}),
     }
@@ -73,7 +71,7 @@ def artde() -> str:
     runs["tde+kd"] = simulate(LAWS["tde"].law, equivalent_gains(constant), ARM, ARM_PERIOD)
     robust = {name: runs[name] for name in ("artde", "artde-robust")}
     charts = {
-        "error": over_time("e (deg)", {name: error(run) for name, run in runs.items()}),
+        "error": errors(runs),
         "b0": over_time("b0 (rad/s^2)", {name: inside(run, "beta_0") for name, run in robust.items()}),
         "b1": over_time("b1 (rad/s^2 per |xi|)", {name: inside(run, "beta_1") for name, run in robust.items()}),
     }
@@ -94,7 +92,7 @@ def constant_gain() -> str:
     for name, values in (("tde+c", sign), ("tde+kd", line)):
         shape.line(s, values, looks([name])[name], text=name)
     charts = {
-        "error": over_time("e (deg)", {name: error(run) for name, run in runs.items()}),
+        "error": errors(runs),
         "robust term": shape.svg(),
     }
     caption = f"{_arm()} RMS error {_values(runs)}. Right: the robust term of constant gain, and its slope at s = 0."
@@ -105,7 +103,7 @@ def pid() -> str:
     runs = {name: arm(name) for name in ("tde", "pid")}
     apart = (runs["tde"].tau - runs["pid"].tau)[:, 0]
     charts = {
-        "error": over_time("e (deg)", {name: error(run) for name, run in runs.items()}),
+        "error": errors(runs),
         "torque of TDE minus torque of PID": over_time(
             "difference (1e-15 Nm)", {"pid": (runs["pid"].time, 1e15 * apart)}
         ),
@@ -121,7 +119,7 @@ def positional_pid() -> str:
     needed = LIFT.load_weight / float(LIFT.inertia)
     learnt, time = runs["pid"].inside["integral"][:, 0], runs["pid"].time
     charts = {
-        "error": over_time("e (mm)", {name: error(run) for name, run in runs.items()}),
+        "error": errors(runs),
         "what the integral has learnt": over_time(
             "integral (m/s^2)", {"pid": (time, learnt - learnt[0])}, level=needed
         ),
@@ -138,7 +136,7 @@ def asmc() -> str:
     ratio = inside(runs["asmc"], "r")
     true = 1.0 + LIFT.load / float(LIFT.inertia)
     charts = {
-        "error": over_time("e (mm)", {name: error(run) for name, run in runs.items()}),
+        "error": errors(runs),
         "switching gain c": over_time("c (m/s^2)", {"asmc": inside(runs["asmc"], "c")}),
         "learnt mass over nominal mass": over_time("r (1)", {"asmc": ratio}, level=true),
     }
@@ -151,7 +149,7 @@ def indi() -> str:
     calm = {name: lift(name) for name in ("tde", "indi")}
     rough = ", ".join(f"{name} {np.std(np.diff(run.tau[:, 0])):.2f} N" for name, run in runs.items())
     charts = {
-        "error": over_time("e (mm)", {name: error(run) for name, run in runs.items()}),
+        "error": errors(runs),
         "force": over_time("force (N)", {name: (run.time, run.tau[:, 0]) for name, run in runs.items()}),
     }
     caption = (
@@ -164,7 +162,7 @@ def indi() -> str:
 def computed() -> str:
     gains = ComputedTorqueGains(25.0, 10.0)
     runs = {"computed-torque": simulate(modelled(ARM), gains, ARM, ARM_PERIOD), "tde": arm("tde")}
-    charts = {"error": over_time("|e| (deg)", {name: size(run) for name, run in runs.items()}, log=True)}
+    charts = {"error": errors(runs, log=True)}
     before = {name: _rms(run, run.time < LOADED) for name, run in runs.items()}
     after = {name: _rms(run, run.time >= LOADED) for name, run in runs.items()}
     caption = (
@@ -258,15 +256,14 @@ def over_time(label: str, columns: Mapping[str, Signal], *, log: bool = False, l
     return chart.svg()
 
 
-def error(run: Run) -> Signal:
-    """Of an arm in degrees, of a lift in millimetres."""
-    return run.time, _scale(run)[0] * run.e[:, 0]
-
-
-def size(run: Run) -> Signal:
-    """The error's size, for a logarithmic axis."""
-    time, e = error(run)
-    return time, np.maximum(np.abs(e), 1e-4)
+def errors(runs: Mapping[str, Run], *, log: bool = False) -> str:
+    """Tracking errors, of an arm in degrees, of a lift in millimetres; their sizes on a logarithmic axis."""
+    columns = {}
+    for name, run in runs.items():
+        e = _scale(run)[0] * run.e[:, 0]
+        columns[name] = run.time, np.maximum(np.abs(e), 1e-4) if log else e
+    unit = _scale(next(iter(runs.values())))[1]
+    return over_time(f"|e| ({unit})" if log else f"e ({unit})", columns, log=log)
 
 
 def inside(run: Run, name: str) -> Signal:

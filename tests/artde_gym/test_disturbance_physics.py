@@ -152,12 +152,6 @@ class Mechanics:
         return np.asarray(state.position) + frames.origin[body] + frames.rot[body] @ np.asarray(offset)
 
 
-def payload_position(engine: Any) -> np.ndarray:
-    if isinstance(engine, MujocoEngine):
-        return np.asarray(engine._payload_center())
-    return np.array(bullet.getBasePositionAndOrientation(engine._payload, physicsClientId=engine._client)[0])
-
-
 def payload_velocity(engine: Any) -> np.ndarray:
     """Of a payload that is held."""
     if isinstance(engine, MujocoEngine):
@@ -323,7 +317,7 @@ def test_the_dropped_ball_falls_freely(engine_name: EngineName) -> None:
     engine, heights = env._engine, []
     for _ in range(100):
         env.step(env._tau)
-        heights.append(payload_position(engine)[2])
+        heights.append(engine.payload_position()[2])
     held, falling = np.array(heights[:25]), np.array(heights[25:])
     assert np.ptp(held) < 1e-3
     time = 0.004 * np.arange(1, len(falling) + 1)
@@ -565,8 +559,8 @@ def test_a_delay_of_n_samples_is_n_samples(
     expected = np.tile(rest, (12, 1))
     expected[4 + samples, KNEE] += 1.5
     np.testing.assert_allclose(applied, expected, rtol=0, atol=1e-12)
-    acting = np.array(record.torques[-12 * env._substeps :])  # what the engine really got
-    np.testing.assert_allclose(acting, np.repeat(expected, env._substeps, axis=0), rtol=0, atol=1e-12)
+    acting = np.array(record.torques[-12 * env._walk.substeps :])  # what the engine really got
+    np.testing.assert_allclose(acting, np.repeat(expected, env._walk.substeps, axis=0), rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("constant", [0.0, 0.002, 0.02, 0.1])
@@ -585,7 +579,7 @@ def test_motors_lag_exponentially(constant: float, control_period: float, monkey
     expected = np.tile(rest, (20, 1))
     expected[:, KNEE] += share
     np.testing.assert_allclose(applied, expected, rtol=0, atol=1e-9)
-    acting = np.array(record.torques[-20 * env._substeps :]).reshape(20, env._substeps, 12).mean(axis=1)
+    acting = np.array(record.torques[-20 * env._walk.substeps :]).reshape(20, env._walk.substeps, 12).mean(axis=1)
     np.testing.assert_allclose(acting, expected, rtol=0, atol=1e-9)
 
 
@@ -625,10 +619,10 @@ def test_a_lost_actuator_gives_its_share_from_its_start(
     env.reset(seed=0)
     record, count = Recorder(env, monkeypatch), 30
     rest, applied = probe(env, np.zeros(count))
-    expected = np.tile(rest, (count * env._substeps, 1))
+    expected = np.tile(rest, (count * env._walk.substeps, 1))
     expected[round(start / DT) :, KNEE] *= 0.3
     np.testing.assert_allclose(record.torques[-len(expected) :], expected, rtol=1e-12)
-    mean = expected.reshape(count, env._substeps, 12).mean(axis=1)
+    mean = expected.reshape(count, env._walk.substeps, 12).mean(axis=1)
     np.testing.assert_allclose(applied, mean, rtol=1e-12)
 
 
