@@ -6,7 +6,7 @@ INSTALL := $(BIN)/python -m pip install --disable-pip-version-check --quiet --co
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help evaluate test check format benchmark docs gallery clean
+.PHONY: help evaluate test check format benchmark soak docs gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*  ## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -28,7 +28,10 @@ format: .venv/dev  ## format and mend what can be mended
 	$(BIN)/ruff format
 
 benchmark: .venv/core  ## speed, as ratios in one run
-	$(BIN)/python scripts/benchmark.py $(ARGS)
+	$(BIN)/artde-gym benchmark $(ARGS)
+
+soak: .venv/dev  ## hours: walks, short episodes, damaged files, random calls, kills (a part: ARGS=...)
+	OMP_NUM_THREADS=1 $(BIN)/python scripts/soak.py $(ARGS)
 
 docs: .venv/docs  ## build the documentation into site/, warnings are errors (to be read in a browser, also without a server)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet

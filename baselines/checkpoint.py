@@ -16,6 +16,9 @@ from typing import Any
 import numpy as np
 import torch
 
+from artde_gym.arguments import reading
+from baselines.errors import TrainingError
+
 KEPT = 2
 
 
@@ -60,6 +63,11 @@ class Checkpoints:
         if not numbered:
             return None
         folder = numbered[-1]
+        allowed = "a folder that `train` wrote; without it, the one before is used"
+        with reading("checkpoint", folder, allowed, TrainingError):
+            return self._restore(folder, model, normaliser)
+
+    def _restore(self, folder: Path, model: Any, normaliser: Any) -> dict[str, Any]:
         parameters = torch.load(folder / "parameters.pt", weights_only=True)
         if "log_ent_coef" in parameters:
             model.log_ent_coef.data.copy_(parameters.pop("log_ent_coef"))

@@ -12,7 +12,6 @@ import io
 import itertools
 import json
 import os
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import artde_gym
-from artde_gym.errors import OptionError
+from artde_gym.arguments import reading
 from artde_gym.layout import Layout
 from baselines.errors import PolicyFileError
 from baselines.network import Network
@@ -85,17 +84,15 @@ def read(folder: Path) -> Saved:
     Raises:
         PolicyFileError: if it is missing, damaged, of another version, or not of this form.
     """
-    try:
+    with reading("policy", folder, f"a folder with {DESCRIPTION} and {WEIGHTS}", PolicyFileError):
         description = json.loads((folder / DESCRIPTION).read_text(encoding="utf-8"))
         content = (folder / WEIGHTS).read_bytes()
-    except (OSError, ValueError) as error:
-        raise PolicyFileError("policy", str(folder), f"a folder with {DESCRIPTION} and {WEIGHTS} ({error})") from error
     if not isinstance(description, Mapping) or description.get("version") != VERSION:
         found = description.get("version") if isinstance(description, Mapping) else None
         raise PolicyFileError(f"version of {folder / DESCRIPTION}", found, f"{VERSION}, what this release reads")
     if hashlib.sha256(content).hexdigest() != description.get("weights_sha256"):
         raise PolicyFileError("weights", str(folder / WEIGHTS), f"the file that {DESCRIPTION} was written with")
-    try:
+    with reading("policy", folder, "what `baselines` writes", PolicyFileError):
         recipe = Recipe(**description["recipe"])
         sizes = description["network"]["sizes"]
         network = _network(content, sizes, bool(description["network"]["squashed"]))
@@ -109,10 +106,6 @@ def read(folder: Path) -> Saved:
             str(description["nominal_robot"]),
             dict(description["about"]),
         )
-    except (KeyError, TypeError, ValueError, OSError, EOFError, zipfile.BadZipFile, OptionError) as error:
-        if isinstance(error, PolicyFileError):
-            raise
-        raise PolicyFileError("policy", str(folder), f"what `baselines` writes ({error!r})") from error
 
 
 def _network(content: bytes, sizes: list[int], squashed: bool) -> Network:

@@ -15,6 +15,7 @@ import gymnasium as gym
 import numpy as np
 
 import artde_gym
+from artde_gym.arguments import reading
 from artde_gym.errors import among
 from artde_gym.evaluation import evaluate
 from baselines.errors import TrainingError
@@ -191,7 +192,8 @@ def _claim(folder: Path, configuration: dict[str, Any]) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         file.write_text(json.dumps({"configuration": configuration, "versions": versions()}, indent=1))
         return
-    before = json.loads(file.read_text())["configuration"]
+    with reading("run", file, "a file that `train` wrote", TrainingError):
+        before = dict(json.loads(file.read_text(encoding="utf-8"))["configuration"])
     for name, value in configuration.items():
         if name not in ("steps", "options") and before.get(name) != value:
             raise TrainingError(f"{name} of the run in {folder}", value, f"{before.get(name)!r}, or another folder")

@@ -6,13 +6,14 @@ from pathlib import Path
 from typing import Any, get_args
 
 from artde_gym.envs import biped_task, quadrotor_task
-from artde_gym.errors import UnknownNameError, among
+from artde_gym.errors import ArtdeGymError, UnknownNameError, among
 from artde_gym.robots.ojas import ActuatorInertia, ojas
 from artde_gym.robots.q450 import q450
 from artde_gym.robots.spec import RobotSpec
 from baselines.errors import PolicyFileError
 from baselines.policy_file import DESCRIPTION, Saved, layout_hash, read
 from baselines.residual import Residual, ResidualPolicy
+from controllers import GainError
 from controllers.policies import Plant
 
 SHIPPED = Path(__file__).parent / "policies"
@@ -87,7 +88,12 @@ def _policy(saved: Saved, env: Any) -> ResidualPolicy:
     plant = Plant.of(env)
     if plant.robot != saved.recipe.robot:
         raise PolicyFileError(f"robot of {saved.name!r}", saved.recipe.robot, f"{plant.robot!r} of the environment")
-    residual = Residual.of(env, saved.recipe)
+    try:
+        residual = Residual.of(env, saved.recipe)
+    except (ArtdeGymError, GainError):
+        raise
+    except Exception as error:  # the recipe's gains may be anything, for a base that takes almost any
+        raise PolicyFileError(f"recipe of {saved.name!r}", saved.recipe, f"one that works ({error!r})") from error
     if layout_hash(residual.features) != saved.features or len(saved.network.mean) != residual.features.size:
         raise PolicyFileError(f"what {saved.name!r} sees", saved.features, f"{layout_hash(residual.features)} here")
     if tuple(residual.actions) != saved.actions or len(saved.network.layers[-1][1]) != len(residual.actions):

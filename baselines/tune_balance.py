@@ -15,6 +15,7 @@ import numpy as np
 from cmaes import CMA
 from numpy.typing import NDArray
 
+from artde_gym.arguments import reading
 from baselines.balance import GAINS, balance_network
 from baselines.errors import TrainingError
 from baselines.network import Network
@@ -46,9 +47,11 @@ def tune(training: Training, out: str | Path, on_progress: Callable[[Progress], 
     file = run.folder / "generations.json"
     told: list[dict[str, Any]] = []
     if file.exists():
-        stored = json.loads(file.read_text())
-        told = stored["generations"]
-        run.state = stored["state"]
+        with reading("generations", file, "a file that `train` wrote", TrainingError):
+            stored = json.loads(file.read_text(encoding="utf-8"))
+            told = [{"costs": [float(cost) for cost in one["costs"]], "steps": int(one["steps"])}
+                    for one in stored["generations"]]  # fmt: skip
+            run.state |= {name: stored["state"][name] for name in run.state}
     strategy = CMA(np.zeros(GAINS), SPREAD, population_size=POPULATION, seed=training.seed)
     steps, generation = 0, 0
     while steps < training.steps and not strategy.should_stop():

@@ -14,11 +14,13 @@ SECTIONS: dict[str, str] = {
     "fleet": "artde_gym.benchmark.flight:fleets",
     "reset": "artde_gym.benchmark.reset:resetting",
     "controllers": "artde_gym.benchmark.calls:calling",
+    "inference": "baselines.benchmark:inference",
+    "training": "baselines.benchmark:training",
     "scaling": "artde_gym.benchmark.scaling:scaling",
     "memory": "artde_gym.benchmark.memory:growing",
     "peers": "artde_gym.benchmark.peers:peers",
 }
-"""Name -> "module:function", called as function(quick) and giving a `Section`; a string, so that a section may need what
+"""Name -> "module:function", called as function(quick) and giving a `Section`; strings, so that a section may need what
 is not installed, or a package that this one may not import."""
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 import statistics
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -17,29 +17,30 @@ TURN = 50
 """Steps that a variant does before it is the next one's turn."""
 
 Job = Callable[[], None]
+Key = TypeVar("Key", bound=Hashable)
 
 
 def in_turns(
-    variants: Mapping[str, Callable[[], Job]], rounds: int, clock: Callable[[], float] = time.process_time
-) -> dict[str, float]:
+    variants: Mapping[Key, Callable[[], Job]], rounds: int, clock: Callable[[], float] = time.process_time
+) -> dict[Key, float]:
     """Seconds that each variant takes for its job of a round, which it prepares untimed.
 
     All of them advance in turns, so that a machine whose speed drifts is as fast for each; a variant's time is the
     median of its turns, which a burst of other work on the machine does not move.
 
     Args:
-        variants: name -> what prepares a job.
+        variants: key -> what prepares a job.
         rounds: of all variants.
         clock: computing time of this process, other processes' left out; `time.perf_counter` for threads and workers.
     """
-    turns: dict[str, list[float]] = {name: [] for name in variants}
+    turns: dict[Key, list[float]] = {key: [] for key in variants}
     for _ in range(rounds):
-        for name, prepare in variants.items():
+        for key, prepare in variants.items():
             job = prepare()
             start = clock()
             job()
-            turns[name].append(clock() - start)
-    return {name: statistics.median(durations) for name, durations in turns.items()}
+            turns[key].append(clock() - start)
+    return {key: statistics.median(durations) for key, durations in turns.items()}
 
 
 class ClosedLoop:

@@ -9,7 +9,20 @@ import gymnasium as gym
 import typer
 
 from artde_gym import __version__
-from artde_gym.cli import evaluate, frontier, listing, play, report, reproduce, sweep, train, tune, video
+from artde_gym.cli import (
+    benchmark,
+    doctor,
+    evaluate,
+    frontier,
+    listing,
+    play,
+    report,
+    reproduce,
+    sweep,
+    train,
+    tune,
+    video,
+)
 from artde_gym.errors import ArtdeGymError
 from controllers import GainError
 
@@ -29,13 +42,15 @@ app.command()(report.report)
 app.command()(video.video)
 app.command()(play.play)
 app.command("list")(listing.list_everything)
+app.command()(benchmark.benchmark)
+app.command()(doctor.doctor)
 
 
 def main() -> None:
     """Run the command; a mistake of the user's is one line on standard error and exit code 2."""
     try:
         app()
-    except (ArtdeGymError, GainError, gym.error.Error) as error:
+    except (ArtdeGymError, GainError, gym.error.Error, OSError) as error:  # of the system: a full disk, say
         typer.echo(f"artde-gym: {error}", err=True)
         sys.exit(2)
 

@@ -48,7 +48,7 @@ def json_object(option: str, text: str | None) -> dict[str, Any]:
         return {}
     try:
         value = json.loads(text)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise OptionError(option, text, f"a JSON object ({error})") from error
     if not isinstance(value, dict):
         raise OptionError(option, text, "a JSON object")

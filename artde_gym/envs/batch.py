@@ -13,6 +13,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
+from artde_gym.arguments import flag
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
 from artde_gym.envs.options import disturbances_in
@@ -69,7 +70,7 @@ class BatchEnv(VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
         self.action_space = batch_space(self.single_action_space, num_envs)
         if not autoreset:
             self.metadata = {**self.metadata, "autoreset_mode": AutoresetMode.DISABLED}
-        self._autoreset = autoreset
+        self._autoreset = flag("autoreset", autoreset)
         seeded = [seeding.np_random() for _ in range(num_envs)]
         self._np_random, self._np_random_seed = map(list, zip(*seeded, strict=True))
         self._k = np.zeros(num_envs, np.int64)
@@ -120,6 +121,8 @@ class BatchEnv(VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
             OptionError: for an unknown option or value, or a scenario that needs another environment.
             DisturbanceError: for a malformed disturbance.
         """
+        if not isinstance(options, Mapping | None):
+            raise OptionError("reset options", options, "a mapping")
         options = dict(options or {})
         mask = self._mask(options.pop("reset_mask", None))
         seeds = self._seeds(seed)
@@ -173,17 +176,19 @@ class BatchEnv(VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
 
     def _commands(self, actions: ArrayLike) -> Array:
         """Checked actions as an array of ours."""
-        given = np.asarray(actions)
         shape = self.action_space.shape
-        if given.shape != shape:
-            raise ActionError("shape of the actions", given.shape, str(shape))
-        with np.errstate(over="ignore"):  # of a cast to float32
-            commands = np.array(given, dtype=self.dtype, order=self.order)
+        try:
+            with np.errstate(over="ignore"):  # of a cast to float32
+                commands = np.array(actions, dtype=self.dtype, order=self.order)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise ActionError("actions", actions, f"numbers of the shape {shape}") from error
+        if commands.shape != shape:
+            raise ActionError("shape of the actions", commands.shape, str(shape))
         commands[self._over] = 0.0
         finite = np.isfinite(commands)
         if not finite.all():
             i = int(np.flatnonzero(~finite.all(axis=1))[0])
-            raise ActionError(f"action of environment {i}", given[i].tolist(), f"finite {self.allowed_action}")
+            raise ActionError(f"action of environment {i}", commands[i].tolist(), f"finite {self.allowed_action}")
         return np.clip(commands, self._low, self._high, out=commands)
 
     def _mask(self, given: Any) -> Mask:
@@ -200,9 +205,12 @@ class BatchEnv(VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
         if given is None:
             return [None] * self.num_envs
         if isinstance(given, (int, np.integer)):
-            return [int(given) + i for i in range(self.num_envs)]
-        if len(given) != self.num_envs:
-            raise OptionError("number of seeds", len(given), f"{self.num_envs}, one for each environment")
+            given = range(int(given), int(given) + self.num_envs)
+        if not isinstance(given, (Sequence, np.ndarray)) or len(given) != self.num_envs:
+            raise OptionError("seed", given, f"None, a number, or {self.num_envs} of them, one for each environment")
+        for seed in given:
+            if not (seed is None or (isinstance(seed, (int, np.integer)) and seed >= 0)):
+                raise OptionError("seed", seed, "a whole number >= 0, or None")
         return [None if seed is None else int(seed) for seed in given]
 
     def _begin(self, mask: Mask) -> dict[str, Any]:

@@ -11,16 +11,18 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from artde_gym.arguments import action_array
 from artde_gym.arrays import Array
 from artde_gym.disturbances.ground import LOADED
 from artde_gym.disturbances.schedule import Schedule
 from artde_gym.envs import biped_task as task
 from artde_gym.envs.biped_course import Course
+from artde_gym.envs.closed import CLOSED
 from artde_gym.envs.documentation import filled
 from artde_gym.envs.live import Live
 from artde_gym.envs.options import disturbances_in
 from artde_gym.envs.view import View
-from artde_gym.errors import ActionError, OptionError
+from artde_gym.errors import OptionError
 from artde_gym.robots import ojas as robot
 from artde_gym.robots.ojas import ActuatorInertia
 from artde_gym.sim.engine import Camera, Engine
@@ -129,9 +131,9 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         if disturbances is not None:
             self._disturbances = self._walk.parse(disturbances)
         realised = self._disturbances.draw(self.np_random)
-        self._k = 0
         self._realised = realised
         self._tau = self._begin(realised)
+        self._k = 0
         self.view.reset()
         info: dict[str, Any] = {"time_s": 0.0, "disturbances": realised}
         return self._measure(info), info
@@ -145,11 +147,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         """
         if self._k >= self._walk.last:
             raise gym.error.ResetNeeded("the walk is over or has not begun: call reset()")
-        action = np.asarray(action, dtype=np.float64)
-        if action.shape != (task.N_JOINTS,):
-            raise ActionError("shape of the action", action.shape, f"({task.N_JOINTS},)")
-        if not math.isfinite(action.dot(action)):
-            raise ActionError("action", action.tolist(), "finite torques (Nm)")
+        action = action_array(action, task.N_JOINTS, "torques (Nm)")
         previous = self._tau
         events = self._simulate(np.minimum(np.maximum(action, self._low), self._high))
         self._k += 1
@@ -177,6 +175,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
 
     def close(self) -> None:
         self._engine.close()
+        self._engine = self.view = CLOSED
 
     @property
     def elapsed(self) -> int:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeVar, get_args
 
 import numpy as np
 
+from artde_gym.arguments import flag, word
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
 from artde_gym.envs.options import steps_per_period
@@ -137,7 +138,7 @@ walk.
 | `self_collision` | False | False, True | whether the feet stop each other, or overlap |
 | `speed` | 0.1 | 0 to 0.25 m/s | walking speed |
 | `step_duration` | 1.0 | 0.6 to 2 s | time of one step |
-| `duration` | 58.0 | from 0.1 s | length of the walk |
+| `duration` | 58.0 | 0.1 to 600 s | length of the walk |
 | `observe_ground_force` | False | False, True | append the ground's force on each foot to the observation |"""
 """What all pages share, with `{observation}` and `{default}` to be filled in; arguments of their own follow."""
 
@@ -182,8 +183,11 @@ class Walk:
         Raises:
             OptionError: for an argument out of range.
         """
+        word("actuator_inertia", actuator_inertia, get_args(ActuatorInertia))
+        word("arms", arms, get_args(Arms))
         nominal = ojas(actuator_inertia)
-        model = dataclasses.replace(ojas(actuator_inertia, arms=arms), feet_collide=self_collision)
+        collide = flag("self_collision", self_collision)
+        model = dataclasses.replace(ojas(actuator_inertia, arms=arms), feet_collide=collide)
         substeps = steps_per_period(control_period, TIME_STEP)
         pattern = walking_pattern(speed, step_duration, duration, TIME_STEP)
         columns = (pattern.q, pattern.qd, pattern.qdd, pattern.load_left[:, None], pattern.phase[:, None])

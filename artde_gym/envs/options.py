@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from artde_gym.arguments import number
 from artde_gym.errors import OptionError
 
 
@@ -16,10 +17,9 @@ def steps_per_period(control_period: float, step: float) -> int:
         OptionError: unless it is a whole number, and the period 0.05 s at most.
     """
     allowed = f"whole multiples of {step} s up to 0.05 s"
-    if not (isinstance(control_period, (int, float)) and math.isfinite(control_period)):
-        raise OptionError("control_period", control_period, allowed)
-    steps = round(control_period / step)
-    if not (1 <= steps <= round(0.05 / step) and math.isclose(steps * step, control_period, rel_tol=1e-9)):
+    period = number("control_period", control_period, 0.0, 0.05 + 0.5 * step, allowed)
+    steps = round(period / step)
+    if not (1 <= steps <= round(0.05 / step) and math.isclose(steps * step, period, rel_tol=1e-9)):
         raise OptionError("control_period", control_period, allowed)
     return steps
 
@@ -31,6 +31,8 @@ def disturbances_in(options: Mapping[str, Any], env: Any) -> Mapping[str, Any] |
         OptionError: for an unknown option, or a scenario that needs other arguments than the environment has.
         UnknownNameError: for an unknown scenario.
     """
+    if not isinstance(options, Mapping):
+        raise OptionError("reset options", options, "a mapping with 'disturbances', 'scenario'")
     for key in options:
         if key not in ("disturbances", "scenario"):
             raise OptionError("reset option", key, "'disturbances', 'scenario'")

@@ -11,6 +11,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from artde_gym.arguments import action_array
 from artde_gym.arrays import Array
 from artde_gym.disturbances.ground_effect import thrust_gain
 from artde_gym.disturbances.noise import draw_keys
@@ -18,12 +19,13 @@ from artde_gym.disturbances.rotors import Rotors
 from artde_gym.disturbances.schedule import Schedule
 from artde_gym.disturbances.wind import GRID, Wind
 from artde_gym.envs import quadrotor_task as task
+from artde_gym.envs.closed import CLOSED
 from artde_gym.envs.documentation import filled
 from artde_gym.envs.live import Live
 from artde_gym.envs.options import disturbances_in, steps_per_period
 from artde_gym.envs.quadrotor_sensors import Measurement, Sensors
 from artde_gym.envs.view import View
-from artde_gym.errors import ActionError, OptionError
+from artde_gym.errors import OptionError
 from artde_gym.references.infinity import START
 from artde_gym.robots import q450 as robot
 from artde_gym.robots.spec import Vector
@@ -141,11 +143,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         """
         if self._over:
             raise gym.error.ResetNeeded("the flight is over or has not begun: call reset()")
-        action = np.asarray(action, dtype=np.float64)
-        if action.shape != (4,):
-            raise ActionError("shape of the action", action.shape, "(4,)")
-        if not all(map(math.isfinite, action.tolist())):
-            raise ActionError("action", action.tolist(), "finite [u1 (N), u2, u3, u4 (Nm)]")
+        action = action_array(action, 4, "[u1 (N), u2, u3, u4 (Nm)]")
         before = self._rotors.thrusts
         events = self._simulate(np.minimum(np.maximum(action, self._low), self._high).tolist())
         self._k += 1
@@ -174,6 +172,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
 
     def close(self) -> None:
         self._engine.close()
+        self._engine = self.view = CLOSED
 
     @property
     def elapsed(self) -> int:

@@ -162,7 +162,7 @@ along the body's axes until the next time.
 besides; `{{}}` for nothing |
 | `control_period` | 0.015 | whole multiples of {GRID:g} s up to 0.05 | time between two actions, L |
 | `measurement` | "ideal" | "ideal", "mocap" | the state itself, or what `artde_gym.disturbances.mocap` sees of it |
-| `duration` | 70.0 | from 0.1 s | length of the flight |"""
+| `duration` | 70.0 | 0.1 to 7200 s | length of the flight |"""
 """What the pages of both environments share; their own arguments follow."""
 
 REWARD_SCALES: dict[str, float] = {

@@ -91,6 +91,6 @@ def scenario(name: str) -> Scenario:
     Raises:
         UnknownNameError: if there is none.
     """
-    if name not in SCENARIOS:
+    if not isinstance(name, str) or name not in SCENARIOS:
         raise UnknownNameError("scenario", name, among(name, SCENARIOS))
     return SCENARIOS[name]

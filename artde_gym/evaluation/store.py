@@ -24,10 +24,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from artde_gym.arguments import file_name, reading
 from artde_gym.errors import StoreError
 from artde_gym.evaluation.provenance import provenance
 
+TABLE = "episodes.csv"
 KEY = ("scenario", "controller", "episode")
+_WORDS = ("scenario", "controller", "env", "fall_reason")
+_UNDAMAGED = "a table of episodes as `evaluate` wrote it; without the damaged rows, these episodes are run again"
 
 
 class Store:
@@ -40,6 +44,8 @@ class Store:
     def __init__(self, folder: Path, configuration: Mapping[str, Any]) -> None:
         self.folder = folder
         self._configuration = json.loads(json.dumps(configuration))
+        for name in configuration["controllers"]:
+            file_name("name of a controller", name)  # of its traces
         if claim(self.folder, "summary.json", self._configuration):
             self._write_record(None)
         self.rows = self._read_rows()
@@ -52,7 +58,7 @@ class Store:
                 self.save_traces(row, traces)
         self.rows += [dict(row) for row, _ in episodes]
         if all(set(row) == set(self._columns) for row, _ in episodes):
-            with (self.folder / "episodes.csv").open("a", encoding="utf-8", newline="") as file:
+            with (self.folder / TABLE).open("a", encoding="utf-8", newline="") as file:
                 file.write("".join(_line([row[column] for column in self._columns]) for row, _ in episodes))
                 file.flush()
                 os.fsync(file.fileno())
@@ -83,21 +89,20 @@ class Store:
         write_atomically(self.folder / "summary.json", lambda file: file.write(text.encode()))
 
     def _read_rows(self) -> list[dict[str, Any]]:
-        path = self.folder / "episodes.csv"
-        if not path.exists():
+        path = self.folder / TABLE
+        whole, frame = read_episodes(self.folder)
+        if frame.empty:
             return []
-        text = path.read_text(encoding="utf-8")
-        whole = text[: text.rfind("\n") + 1]  # a row cut off by a crash has no end of line
-        if not whole:
-            return []
-        frame = pd.read_csv(io.StringIO(whole), keep_default_na=True)
-        missing = [name for name in KEY if name not in frame]
-        if missing:
-            raise StoreError("episodes.csv", str(path), f"a table with the columns {', '.join(KEY)}")
+        wanted = self._configuration
+        known = ([cell["name"] for cell in wanted["cells"]], wanted["controllers"], range(wanted["episodes"]))
+        for column, values in zip(KEY, known, strict=True):
+            strange = [value for value in frame[column] if value not in values]
+            if strange:
+                raise StoreError(TABLE, str(path), f"{_UNDAMAGED} (it has a {column} {strange[0]!r})")
         rows = [{str(key): value for key, value in row.items()} for row in frame.to_dict(orient="records")]
         for row in rows:
             row["fall_reason"] = row["fall_reason"] if isinstance(row.get("fall_reason"), str) else ""
-        if whole != text:
+        if path.stat().st_size != len(whole.encode()):
             write_atomically(path, lambda file: file.write(whole.encode()))
         return rows
 
@@ -106,7 +111,37 @@ class Store:
         self._columns = list(dict.fromkeys(column for row in self.rows for column in row))
         lines = [_line(self._columns)]
         lines += [_line([row.get(column, "") for column in self._columns]) for row in self.rows]
-        write_atomically(self.folder / "episodes.csv", lambda file: file.write("".join(lines).encode()))
+        write_atomically(self.folder / TABLE, lambda file: file.write("".join(lines).encode()))
+
+
+def read_episodes(folder: Path) -> tuple[str, pd.DataFrame]:
+    """The table of finished episodes, as text and parsed; a row cut off by a crash, or just being written, is left out.
+
+    Raises:
+        StoreError: if it is damaged.
+    """
+    path = folder / TABLE
+    with reading(TABLE, path, _UNDAMAGED, StoreError):
+        text = path.read_text(encoding="utf-8") if path.exists() else ""
+        whole = text[: text.rfind("\n") + 1]
+        if not whole:
+            return "", pd.DataFrame({name: [] for name in KEY})
+        lines = list(csv.reader(io.StringIO(whole), strict=True))
+        frame = pd.read_csv(io.StringIO(whole), keep_default_na=True)
+        if len(set(lines[0])) != len(lines[0]) or any(len(line) != len(lines[0]) for line in lines):
+            raise ValueError("rows of different lengths, or a column twice")
+        for name in KEY[:2]:
+            for value in frame[name].unique():
+                file_name(name, value)
+        for name, kind in {"episode": "iu", "seed": "iu", "fell": "b", "duration_s": "fiu"}.items():
+            if frame[name].dtype.kind not in kind:
+                raise ValueError(f"{name} is no column of its kind")
+        words = [str(name) for name in frame.select_dtypes(exclude=["number", "bool"]) if name not in _WORDS]
+        if any(not name.startswith("disturbance.") and frame[name].notna().any() for name in words):
+            raise ValueError(f"words among the numbers of {', '.join(words)}")
+        if frame.duplicated(list(KEY)).any():
+            raise ValueError("an episode twice")
+    return whole, frame
 
 
 def claim(folder: Path, record: str, configuration: Mapping[str, Any]) -> bool:
@@ -117,10 +152,8 @@ def claim(folder: Path, record: str, configuration: Mapping[str, Any]) -> bool:
     """
     path = folder / record
     if path.exists():
-        try:
-            found = json.loads(path.read_text(encoding="utf-8"))["configuration"]
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise StoreError("output folder", str(folder), f"a folder whose {record} can be read") from error
+        with reading("output folder", folder, f"a folder whose {record} can be read", StoreError):
+            found = dict(json.loads(path.read_text(encoding="utf-8"))["configuration"])
         if found != configuration:
             differs = [key for key in {*found, *configuration} if found.get(key) != configuration.get(key)]
             allowed = f"a new folder; this one holds other results (different: {', '.join(sorted(differs))})"

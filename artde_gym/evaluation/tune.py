@@ -28,7 +28,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from artde_gym.errors import OptionError
+from artde_gym.arguments import reading
+from artde_gym.errors import OptionError, StoreError
 from artde_gym.evaluation.environments import Backend, single, tracking_of
 from artde_gym.evaluation.evaluate import DEFAULT_ENVIRONMENT, Update, evaluate
 from artde_gym.evaluation.provenance import provenance
@@ -244,9 +245,17 @@ class _Folder:
         self.rows: list[dict[str, Any]] = []
         if path.exists() and (not path.is_dir() or any(path.iterdir())):
             claim(path, RECORD, self._configuration)
-            if (path / "trials.csv").exists():
-                with (path / "trials.csv").open(encoding="utf-8", newline="") as file:
-                    self.rows = [_parsed(row) for row in csv.DictReader(file)]
+            trials = path / "trials.csv"
+            if trials.exists():
+                with reading("trials.csv", trials, "a table that `tune` wrote", StoreError):
+                    with trials.open(encoding="utf-8", newline="") as file:
+                        self.rows = [_parsed(row) for row in csv.DictReader(file, strict=True)]
+                    for row in self.rows:
+                        if (
+                            json.loads(row["gains"]).keys()
+                            != self._configuration["controllers"][row["controller"]].keys()
+                        ):
+                            raise ValueError(f"gains of another law in a row of {row['controller']}")
 
     def write(self, rows: list[dict[str, Any]]) -> None:
         """Keep the finished trials."""

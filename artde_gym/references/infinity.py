@@ -15,12 +15,13 @@ import math
 
 import numpy as np
 
+from artde_gym.arguments import number
 from artde_gym.arrays import Array
-from artde_gym.errors import OptionError
 
 START = (0.0, 0.0, 0.6)  # m
 LOOPS = ((0.0, 33.0), (37.0, 70.0))  # s
 RAMP = 4.0  # s
+LONGEST = 7200.0  # s
 
 _AMPLITUDE = np.array([1.2, 0.6, 0.2])
 _FREQUENCY = np.array([1.0, 2.0, 1.0])  # waves a turn
@@ -51,12 +52,10 @@ def infinity_path(duration: float = 70.0, period: float = 0.015) -> InfinityPath
     The result is cached and its arrays are read-only, so that every environment of a process shares one.
 
     Raises:
-        OptionError: a path shorter than 0.1 s, or a period outside 0 to 0.1 s.
+        OptionError: a path outside 0.1 to 7200 s, or a period outside 1e-6 to 0.1 s.
     """
-    if not (math.isfinite(duration) and duration >= 0.1):
-        raise OptionError("duration", duration, "a finite number >= 0.1 s")
-    if not 0.0 < period <= 0.1:
-        raise OptionError("period", period, "above 0, up to 0.1 s")
+    duration = number("duration", duration, 0.1, LONGEST, f"0.1 to {LONGEST:g} s")
+    period = number("period", period, 1e-6, 0.1, "1e-6 to 0.1 s")
     return _path(duration, period)  # by position: the cache tells names from positions
 
 

@@ -39,12 +39,12 @@ def preset_gains(robot: str, law: str, preset: str | None, joints: int, override
         GainError: for a gain that the law does not have, or a value that it does not allow.
     """
     gains = _preset(robot, law, preset).gains
-    flat = _flat(gains)
+    flat = named_gains(gains)
     for name in overrides:
         if name not in flat:
             raise GainError(f"of {law!r}", name, among(name, flat))
     gains = _replaced(gains, overrides)
-    for name, value in _flat(gains).items():
+    for name, value in named_gains(gains).items():
         if np.ndim(value) > 0 and np.shape(value)[0] != joints:
             raise GainError(name, value, f"one number, or one for each of the {joints} joints")
     return gains
@@ -56,7 +56,7 @@ def gain_ranges(robot: str, law: str, preset: str | None) -> dict[str, GainRange
     Raises:
         UnknownNameError: as `preset_gains`, or for a law whose gains nobody tunes.
     """
-    gains = _flat(_preset(robot, law, preset).gains)
+    gains = named_gains(_preset(robot, law, preset).gains)
     known = RANGES[robot]
     if law not in known:
         raise UnknownNameError(f"controller of {robot!r} to be tuned", law, among(law, known))
@@ -74,13 +74,13 @@ def _preset(robot: str, law: str, preset: str | None) -> Preset:
     return known[law, preset or names[0]]
 
 
-def _flat(gains: Any) -> dict[str, Any]:
+def named_gains(gains: Any) -> dict[str, Any]:
     """All gains by the name that an override uses."""
     named: dict[str, Any] = {}
     for field in dataclasses.fields(gains):
         value = getattr(gains, field.name)
         if field.name in LOOPS:
-            named |= {f"{name}_{LOOPS[field.name]}": inner for name, inner in _flat(value).items()}
+            named |= {f"{name}_{LOOPS[field.name]}": inner for name, inner in named_gains(value).items()}
         else:
             named[field.name] = value
     return named

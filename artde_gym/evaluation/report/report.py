@@ -9,6 +9,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from artde_gym.arguments import reading
 from artde_gym.errors import StoreError
 from artde_gym.evaluation.environments import robot_of
 from artde_gym.evaluation.frontier import RECORD
@@ -45,13 +46,15 @@ def write_report(
     folder = Path(folder)
     if not folder.is_dir():
         raise StoreError("results folder", str(folder), "a folder that `evaluate`, `frontier` or `train` wrote")
-    if (folder / RECORD).exists():
-        text = _frontier(folder)
-    elif (folder / training_page.RECORD).exists():
-        text = _training(training_page.read_training(folder))
-    else:
-        run = Run.read(folder)
-        text = _evaluation(run, Album(run, pictures, videos, on_progress))
+    wanted = "one that `evaluate`, `frontier` or `train` of this release wrote"
+    with reading("results folder", folder, wanted, StoreError):
+        if (folder / RECORD).exists():
+            text = _frontier(folder)
+        elif (folder / training_page.RECORD).exists():
+            text = _training(training_page.read_training(folder))
+        else:
+            run = Run.read(folder)
+            text = _evaluation(run, Album(run, pictures, videos, on_progress))
     write_atomically(folder / NAME, lambda file: file.write(text.encode()))
     return folder / NAME
 

@@ -12,11 +12,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from artde_gym.arguments import reading
 from artde_gym.arrays import Array
 from artde_gym.errors import StoreError
 from artde_gym.evaluation.environments import tracking_of
 from artde_gym.evaluation.metrics import Span, events_of
 from artde_gym.evaluation.result import Result
+from artde_gym.evaluation.store import read_episodes
 from artde_gym.tracking import Tracking
 
 ABLATIONS = "ablation"  # folder of `reproduce`'s ablations
@@ -48,16 +50,11 @@ class Run:
         Raises:
             StoreError: if it is none.
         """
-        try:
+        with reading("results folder", folder, "one that `evaluate` or `frontier` wrote", StoreError):
             record = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
             wanted = record["configuration"]
             count = len(wanted["cells"]) * len(wanted["controllers"]) * wanted["episodes"]
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise StoreError("results folder", str(folder), "one that `evaluate` or `frontier` wrote") from error
-        path = folder / "episodes.csv"
-        text = path.read_text(encoding="utf-8") if path.exists() else ""
-        whole = text[: text.rfind("\n") + 1]
-        episodes = pd.read_csv(io.StringIO(whole)) if whole else pd.DataFrame({"controller": [], "scenario": []})
+        _, episodes = read_episodes(folder)
         complete = len(episodes) >= count
         claims = folder / "claims.csv"
         judged = pd.read_csv(claims, keep_default_na=False) if claims.exists() else None
@@ -101,7 +98,8 @@ class Run:
         rows = self.result.rows(scenario, controller)
         if not path.exists() or number not in rows.index:
             return None
-        with np.load(path) as stored:
+        with reading("signals", path, "a file that `evaluate` wrote", StoreError):
+            stored = np.load(io.BytesIO(path.read_bytes()), allow_pickle=False)  # a damaged file it would leave open
             return Signals({name: stored[name] for name in stored.files}, rows.loc[number].to_dict())
 
 

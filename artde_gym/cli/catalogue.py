@@ -1,0 +1,169 @@
+"""All that there is, as data that JSON can hold: what `list` shows."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+from artde_gym.cli.arguments import ENGINES
+from artde_gym.disturbances import KINDS
+from artde_gym.disturbances.kinds import ALL, allowed
+from artde_gym.evaluation import SCENARIOS
+from artde_gym.evaluation.environments import arguments_of, ours, robot_of
+from artde_gym.evaluation.frontier_standard import STANDARDS
+from artde_gym.registration import registered_controllers
+from artde_gym.robots.ojas import ojas
+from artde_gym.robots.q450 import ROTORS, q450
+from controllers.presets import LOOPS, PRESETS, named_gains
+from controllers.presets.units import unit_of
+
+Entries = list[dict[str, Any]]
+
+
+def environments() -> Entries:
+    """Every environment with its arguments and defaults."""
+    return [
+        {
+            "name": name,
+            "robot": robot_of(name),
+            "engines": engines(name),
+            "arguments": {
+                argument: None if parameter.default is inspect.Parameter.empty else parameter.default
+                for argument, parameter in arguments_of(name).items()
+            },
+        }
+        for name in ours()
+    ]
+
+
+def scenarios() -> Entries:
+    """Every scenario with its environment, arguments and disturbances."""
+    return [
+        {
+            "name": entry.name,
+            "text": entry.text,
+            "environment": entry.env_id,
+            "engines": engines(entry.env_id),
+            "arguments": dict(entry.kwargs),
+            "disturbances": dict(entry.disturbances),
+            "thesis": entry.thesis,
+        }
+        for entry in SCENARIOS.values()
+    ]
+
+
+def controllers() -> Entries:
+    """Every controller with the gains of each preset, by robot, as far as it has presets."""
+    found = []
+    for name, spec in registered_controllers().items():
+        law, wanted = spec.kwargs.get("law", name), spec.kwargs.get("preset")
+        presets: Entries = []
+        own_gains: dict[str, None] = {}
+        for robot, table in PRESETS.items():
+            names = [preset for of, preset in table if of == law]
+            for preset in names:
+                entry = table[law, preset]
+                for loop in [getattr(entry.gains, field) for field in LOOPS if hasattr(entry.gains, field)] or [
+                    entry.gains
+                ]:
+                    own_gains |= dict.fromkeys(named_gains(loop))
+                presets.append({
+                    "robot": robot,
+                    "preset": preset,
+                    "default": preset == (wanted or names[0]),
+                    "source": entry.source,
+                    "gains": {
+                        gain: {"value": _plain(value), "unit": unit_of(gain)}
+                        for gain, value in named_gains(entry.gains).items()
+                    },
+                })  # fmt: skip
+        found.append(
+            {
+                "name": name,
+                "text": spec.text,
+                "entry_point": spec.entry_point,
+                "gains": list(own_gains),
+                "presets": presets,
+            }
+        )
+    return found
+
+
+def disturbances() -> Entries:
+    """Every kind of disturbance with the schema of its parameters."""
+    return [
+        {
+            "name": kind.name,
+            "text": kind.text,
+            "robots": list(kind.robots),
+            "list": kind.repeated,
+            "bare_number": kind.scalar,
+            "words": {
+                robot: {
+                    parameter.name: _words(parameter.words, robot)
+                    for parameter in kind.parameters
+                    if parameter.size == 0
+                }
+                for robot in kind.robots
+            },
+            "parameters": [
+                {
+                    "name": parameter.name,
+                    "unit": parameter.unit,
+                    "allowed": allowed(parameter),
+                    "required": parameter.default is None,
+                    "default": _plain(parameter.default),
+                    "other_defaults": {robot: _plain(value) for robot, value in parameter.other_defaults.items()},
+                    "text": parameter.text,
+                }
+                for parameter in kind.parameters
+            ],
+        }
+        for kind in KINDS.values()
+    ]
+
+
+def frontiers() -> Entries:
+    """Every path that a frontier varies within a range of its own."""
+    return [
+        {"name": path, "robot": robot, **values._asdict()}
+        for robot, standard in STANDARDS.items()
+        for path, values in standard.ranges.items()
+    ]
+
+
+def _words(words: tuple[str, ...] | str, robot: str) -> list[str]:
+    """What a word may be: places and joints are the robot's."""
+    if not isinstance(words, str):
+        return list(words)
+    spec = ojas() if robot == "ojas" else q450()
+    return [name for name, _, _ in spec.sites] if words == "site" else [*(spec.actuated or ROTORS), ALL]
+
+
+TOPICS: dict[str, Callable[[], Entries]] = {
+    "environments": environments,
+    "scenarios": scenarios,
+    "controllers": controllers,
+    "disturbances": disturbances,
+    "frontiers": frontiers,
+}
+
+
+def engines(env_id: str) -> list[str]:
+    """What an environment runs in; "batch" is many at once."""
+    able = [*ENGINES] if "engine" in arguments_of(env_id) else []
+    return [*able, *(["batch"] if gym.spec(env_id).vector_entry_point else [])]
+
+
+def _plain(value: Any) -> Any:
+    """A gain or default as JSON has it: matrices and vectors as lists, what is not finite as a word."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    if isinstance(value, (np.ndarray, tuple, list)):
+        return [_plain(item) for item in np.asarray(value).tolist()]
+    return value

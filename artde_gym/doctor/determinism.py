@@ -1,0 +1,60 @@
+"""Whether the same seed gives the same bits."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import multiprocessing
+from typing import Any
+
+import gymnasium as gym
+
+import artde_gym  # noqa: F401  # registers the environments
+from artde_gym.doctor.outcome import Outcome
+from artde_gym.registration import make_controller
+
+STEPS = 150
+WALK, FLIGHT = "BipedWalk-Payload-v0", "QuadInfinity-Payload-v0"
+REMEDY = "see docs/determinism.md; results of this machine cannot be repeated to the bit"
+
+
+def determinism() -> list[Outcome]:
+    """The same closed loop twice here and once in another process, in every engine."""
+    names = runs()
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        there = pool.map_async(digest, names)
+        here = [(digest(name), digest(name)) for name in names]
+        elsewhere = there.get()
+    outcomes = []
+    for name, (first, second), other in zip(names, here, elsewhere, strict=True):
+        if first == second == other:
+            outcomes.append(Outcome(name, "ok", "the same bits twice, and in another process"))
+        else:
+            where = "in one process" if first != second else "from one process to another"
+            outcomes.append(Outcome(name, "failed", f"results differ {where}", REMEDY))
+    return outcomes
+
+
+def runs() -> list[str]:
+    """What is run."""
+    engines = ["bullet", *(["mujoco"] if importlib.util.find_spec("mujoco") else [])]
+    return [*(f"{robot} in {engine}" for engine in engines for robot in ("biped", "quadrotor")), "quadrotors in batch"]
+
+
+def digest(name: str) -> str:
+    """Hash of all observations of a seeded closed loop."""
+    robot, engine = name.split(" in ")
+    env: Any
+    if engine == "batch":
+        env = gym.make_vec(FLIGHT, 4, "vector_entry_point", duration=5.0)
+    else:
+        env = gym.make(WALK if robot == "biped" else FLIGHT, disable_env_checker=True, duration=3.0, engine=engine)
+    policy = make_controller("artde", env)
+    observation, _ = env.reset(seed=0)
+    seen, state = hashlib.sha256(observation.tobytes()), None
+    for _ in range(STEPS):
+        action, state = policy.predict(observation, state)
+        observation, *_ = env.step(action)
+        seen.update(observation.tobytes())
+    env.close()
+    return seen.hexdigest()

@@ -1,0 +1,82 @@
+"""Every environment against the checkers of Gymnasium and Stable-Baselines3."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.utils.env_checker import check_env
+
+import artde_gym  # noqa: F401  # registers the environments
+from artde_gym.doctor.outcome import Outcome
+from artde_gym.evaluation.environments import ours
+
+IN_SI_UNITS = r".*(symmetric and normalized|recommend using np.float32)"
+"""Warnings that are no findings: actions are in Nm and N, and float64, by design; RescaleAction gives [-1, 1]."""
+REMEDY = "pip install -c constraints.txt --force-reinstall . : the tests pass with these versions"
+
+
+def bullet() -> list[Outcome]:
+    """Gymnasium's checker on every environment, in the default engine."""
+    return [_checked(name, "bullet", _gymnasium) for name in ours()]
+
+
+def mujoco() -> list[Outcome]:
+    """Likewise in the second engine."""
+    if importlib.util.find_spec("mujoco") is None:
+        return [Outcome("MuJoCo", "missing", "not installed", "pip install 'artde-gym[mujoco]'")]
+    return [_checked(name, "mujoco", _gymnasium) for name in ours()]
+
+
+def stable_baselines3() -> list[Outcome]:
+    """Stable-Baselines3's checker on every environment."""
+    if importlib.util.find_spec("stable_baselines3") is None:
+        return [Outcome("Stable-Baselines3", "missing", "not installed", "pip install 'artde-gym[rl]'")]
+    checker = importlib.import_module("stable_baselines3.common.env_checker")
+    return [_checked(name, "bullet", checker.check_env) for name in ours()]
+
+
+def batch() -> list[Outcome]:
+    """Vectors of environments: shapes, bounds, and that a vector of one equals a part of a vector of many."""
+    outcomes = []
+    for name in ours():
+        if gym.spec(name).vector_entry_point is None:
+            continue
+        makers: list[Any] = [gym.make_vec(name, size, "vector_entry_point", duration=3.0) for size in (8, 1)]
+        many, one = makers
+        action = many.action_space.low * 0.5 + many.action_space.high * 0.5
+        many.reset(seed=[7, *range(1, 8)])
+        one.reset(seed=[7])
+        same = True
+        for _ in range(20):
+            seen, alone = many.step(action)[0], one.step(action[:1])[0]
+            same &= seen[:1].tobytes() == alone.tobytes() and many.observation_space.contains(np.array(seen))
+        many.close()
+        one.close()
+        text = "8 at once, the first as if alone"
+        outcomes.append(Outcome(name, "ok", text) if same else Outcome(name, "failed", f"not {text}", REMEDY))
+    return outcomes
+
+
+def _gymnasium(env: Any) -> None:
+    check_env(env, skip_render_check=True)  # pictures have a check of their own
+
+
+def _checked(name: str, engine: str, checker: Callable[[Any], None]) -> Outcome:
+    try:
+        env = gym.make(name, disable_env_checker=True, duration=3.0, engine=engine)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            warnings.filterwarnings("ignore", message=IN_SI_UNITS)
+            checker(env.unwrapped)
+        env.close()
+    except Exception as error:
+        return Outcome(name, "failed", f"{type(error).__name__}: {error}", REMEDY)
+    if caught:
+        return Outcome(name, "ok", f"check_env passes, and says: {caught[0].message}")
+    return Outcome(name, "ok", "check_env passes")

@@ -1,0 +1,104 @@
+"""Python, packages and files."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import platform
+import shutil
+import tempfile
+from importlib import metadata
+from pathlib import Path
+
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
+
+from artde_gym.doctor.outcome import Outcome, Status
+
+PACKAGE = "artde-gym"
+MODULES = {"pybullet": "pybullet", "numpy": "numpy", "scipy": "scipy", "matplotlib": "matplotlib", "pandas": "pandas"}
+"""Packages with compiled parts -> what is imported to see that they load."""
+DISK = 1e9  # bytes, of which a results folder seldom needs more
+RUNS = Path("runs")
+
+
+def python() -> list[Outcome]:
+    """The interpreter, and what the package cannot do without."""
+    try:
+        wanted = str(metadata.metadata(PACKAGE)["Requires-Python"])
+    except metadata.PackageNotFoundError:
+        return [
+            Outcome(
+                PACKAGE, "failed", "on the path, but not installed", "pip install -c constraints.txt -e . in its folder"
+            )
+        ]
+    version = platform.python_version()
+    system = f"{platform.system()} {platform.machine()}"
+    right = SpecifierSet(wanted).contains(version) and platform.python_implementation() == "CPython"
+    here = f"{platform.python_implementation()} {version} on {system}"
+    remedy = "make a virtual environment of CPython 3.11: python3.11 -m venv .venv"
+    outcomes = [Outcome("Python", "ok", here) if right else Outcome("Python", "failed", here, remedy)]
+    if (platform.system(), platform.machine()) != ("Linux", "x86_64"):
+        outcomes.append(Outcome("platform", "failed", system, "use Linux x86-64, for which PyBullet has wheels"))
+    outcomes += [_installed(one, "failed", f"pip install '{one}'") for one in _requirements(None)]
+    for name, module in MODULES.items():
+        try:
+            importlib.import_module(module)
+        except Exception as error:
+            again = f"pip install --force-reinstall --no-deps {name}"
+            outcomes.append(Outcome(f"import {module}", "failed", f"{type(error).__name__}: {error}", again))
+    return outcomes
+
+
+def extras() -> list[Outcome]:
+    """Every extra with the versions of its packages."""
+    outcomes = []
+    for extra in metadata.metadata(PACKAGE).get_all("Provides-Extra") or ():
+        remedy = f"pip install '{PACKAGE}[{extra}]'"
+        found = [_installed(requirement, "missing", remedy) for requirement in _requirements(extra)]
+        text = ", ".join(f"{outcome.what} {outcome.found}" for outcome in found)
+        whole = all(outcome.status == "ok" for outcome in found)
+        outcomes.append(Outcome(f"extra [{extra}]", "ok" if whole else "missing", text, "" if whole else remedy))
+    return outcomes
+
+
+def files() -> list[Outcome]:
+    """Whether results can be written where they go by default, and whether there is room."""
+    folder = RUNS.absolute()
+    place = next(parent for parent in (folder, *folder.parents) if parent.exists())
+    try:
+        with tempfile.NamedTemporaryFile(dir=place, prefix=".artde-gym-") as file:
+            file.write(b"0" * 4096)
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:
+        remedy = "go to a folder that you may write in, or name one with --out"
+        return [Outcome("results folder", "failed", f"{place}: {error.strerror}", remedy)]
+    free = shutil.disk_usage(place).free
+    room = f"{free / 1e9:.1f} GB free"
+    outcomes = [Outcome("results folder", "ok", f"{RUNS}/ can be written")]
+    if free < DISK:
+        return [*outcomes, Outcome("disk", "missing", room, "make room, or name a folder elsewhere with --out")]
+    return [*outcomes, Outcome("disk", "ok", room)]
+
+
+def _requirements(extra: str | None) -> list[Requirement]:
+    """Of the package itself, or of one extra alone."""
+    found = []
+    for text in metadata.requires(PACKAGE) or ():
+        requirement = Requirement(text)
+        marker, requirement.marker = requirement.marker, None
+        of_extra = marker is not None and "extra" in str(marker)
+        if of_extra != (extra is None) and (marker is None or marker.evaluate({"extra": extra or ""})):
+            found.append(requirement)
+    return found
+
+
+def _installed(requirement: Requirement, otherwise: Status, remedy: str) -> Outcome:
+    try:
+        version = metadata.version(requirement.name)
+    except metadata.PackageNotFoundError:
+        return Outcome(requirement.name, otherwise, "not installed", remedy)
+    if not requirement.specifier.contains(version, prereleases=True):
+        return Outcome(requirement.name, otherwise, f"{version}, not {requirement.specifier}", remedy)
+    return Outcome(requirement.name, "ok", version)

@@ -1,0 +1,72 @@
+"""What a script on an engine cannot do without: the loop that our environments are measured against."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from artde_gym.arrays import Array
+from artde_gym.sim.bullet import BulletEngine, bullet
+from artde_gym.sim.engine import Engine
+
+
+def joint_loop(engine: Engine) -> Callable[[Array], Any]:
+    """A function of joint torques: write them, step, read the joints."""
+    if isinstance(engine, BulletEngine):
+        client, robot, joints = engine._client, engine._robot, engine._joints
+
+        def in_bullet(tau: Array) -> Any:
+            bullet.setJointMotorControlArray(
+                robot, joints, bullet.TORQUE_CONTROL, forces=tau.tolist(), physicsClientId=client
+            )
+            bullet.stepSimulation(physicsClientId=client)
+            return bullet.getJointStates(robot, joints, physicsClientId=client)
+
+        return in_bullet
+    mj, model, data, joints = _mujoco(engine)
+
+    def in_mujoco(tau: Array) -> Any:
+        data.qfrc_applied[6:][joints] = tau
+        mj.mj_step(model, data)
+        return data.qpos.copy(), data.qvel.copy()
+
+    return in_mujoco
+
+
+def body_loop(engine: Engine, steps: int) -> Callable[[Array], Any]:
+    """A function of a wrench [u1 (N), u2, u3, u4 (Nm)]: `steps` times write it and step, then read the body."""
+    if isinstance(engine, BulletEngine):
+        client, robot, origin = engine._client, engine._robot, (0.0, 0.0, 0.0)
+
+        def in_bullet(wrench: Array) -> Any:
+            u1, *torque = wrench.tolist()
+            force = (0.0, 0.0, u1)
+            for _ in range(steps):
+                bullet.applyExternalForce(robot, -1, force, origin, bullet.LINK_FRAME, physicsClientId=client)
+                bullet.applyExternalTorque(robot, -1, torque, bullet.LINK_FRAME, physicsClientId=client)
+                bullet.stepSimulation(physicsClientId=client)
+            position = bullet.getBasePositionAndOrientation(robot, physicsClientId=client)
+            return position, bullet.getBaseVelocity(robot, physicsClientId=client)
+
+        return in_bullet
+    mj, model, data, _ = _mujoco(engine)
+    mj.mj_kinematics(model, data)  # restored states leave orientations to the first step
+
+    def in_mujoco(wrench: Array) -> Any:
+        u1, *torque = wrench.tolist()
+        for _ in range(steps):
+            rot = data.xmat[1].reshape(3, 3)
+            data.xfrc_applied[1, :3] = u1 * rot[:, 2]
+            data.xfrc_applied[1, 3:] = rot @ np.array(torque)
+            mj.mj_step(model, data)
+        return data.qpos.copy(), data.qvel.copy()
+
+    return in_mujoco
+
+
+def _mujoco(engine: Any) -> tuple[Any, Any, Any, Any]:
+    import mujoco  # an extra; the engine that was given has it
+
+    return mujoco, engine._model, engine._data, engine._joints

@@ -1,0 +1,86 @@
+"""`artde-gym list`: all there is, from the tables that work with it."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import gymnasium as gym
+import pytest
+from typer.testing import CliRunner
+
+import controllers
+from artde_gym.cli import app
+from artde_gym.cli.catalogue import TOPICS
+from artde_gym.disturbances import KINDS
+from artde_gym.evaluation import SCENARIOS
+from artde_gym.registration import registered_controllers
+from controllers.presets import named_gains
+
+
+def listing(*arguments: str) -> str:
+    outcome = CliRunner().invoke(app, ["list", *arguments], env={"COLUMNS": "80"})
+    assert outcome.exit_code == 0, outcome.output
+    return outcome.output
+
+
+def test_everything_has_a_place_and_fits_a_narrow_terminal() -> None:
+    for arguments in ([], *([topic] for topic in TOPICS)):
+        text = listing(*arguments)
+        assert max(map(len, text.splitlines())) <= 80
+    text = listing()
+    for name in (*SCENARIOS, *registered_controllers(), *KINDS, "BipedPush-v0", "wind.scale", "bullet, mujoco, batch"):
+        assert name in text
+    text = listing("disturbances", "--name", "push")
+    for word in ("torso", "chest", "0 to 500 N", "required", '{"uniform": [low, high]}'):
+        assert word in text
+
+
+def test_json_holds_the_gains_that_a_controller_has() -> None:
+    """Every preset, built for the robot, has the very gains that are listed."""
+    envs: dict[str, Any] = {
+        "ojas": gym.make("BipedWalk-Payload-v0", disable_env_checker=True, duration=0.2),
+        "q450": gym.make("QuadInfinity-Payload-v0", disable_env_checker=True, duration=0.2),
+    }
+    found = json.loads(listing("controllers", "--json"))
+    assert [entry["name"] for entry in found] == list(registered_controllers())
+    for entry in found:
+        for preset in entry["presets"]:
+            if (entry["name"] in ("pid", "tde+kd") and preset["robot"] == "ojas") or entry["name"] == "tde+kd":
+                continue  # the law's own gains are computed from these
+            policy = controllers.make(entry["name"], envs[preset["robot"]], preset=preset["preset"])
+            built = {name: _plain(value) for name, value in named_gains(policy.gains).items()}
+            assert built == {name: gain["value"] for name, gain in preset["gains"].items()}, entry["name"]
+            assert preset["source"]
+    for env in envs.values():
+        env.close()
+    artde = next(entry for entry in found if entry["name"] == "artde")
+    (default,) = [one for one in artde["presets"] if one["robot"] == "ojas" and one["default"]]
+    assert default["gains"]["m_bar"] == {"value": 0.042, "unit": "kg m^2"}
+    assert default["gains"]["cap"]["value"] == "inf"
+
+
+def _plain(value: Any) -> Any:
+    if value == float("inf"):
+        return "inf"
+    return list(value) if isinstance(value, tuple) else value
+
+
+def test_json_holds_the_schemas_of_the_disturbances() -> None:
+    found = {entry["name"]: entry for entry in json.loads(listing("disturbances", "--json"))}
+    assert list(found) == list(KINDS)
+    (mass, *_) = found["payload"]["parameters"]
+    assert (mass["name"], mass["unit"], mass["required"]) == ("mass", "kg", True)
+    assert found["payload"]["bare_number"] == "mass"
+    assert "chest" in found["push"]["words"]["ojas"]["body"]
+    scenarios = json.loads(listing("--json"))["scenarios"]
+    assert scenarios[0]["engines"][:2] == ["bullet", "mujoco"]
+
+
+@pytest.mark.parametrize(
+    "arguments", [["controler"], ["controllers", "--name", "artd"], ["--name", "artde"], ["scenarios", "--name", "S9"]]
+)
+def test_a_wrong_name_is_refused(arguments: list[str]) -> None:
+    outcome = CliRunner().invoke(app, ["list", *arguments])
+    assert outcome.exit_code == 1
+    assert "allowed" in str(outcome.exception)

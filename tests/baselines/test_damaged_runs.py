@@ -1,0 +1,123 @@
+"""Saved policies and training runs that are damaged, or made to do harm: refused by an error of ours, unexecuted."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import os
+import random
+import shutil
+import warnings
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import baselines
+from artde_gym.errors import ArtdeGymError
+from baselines.errors import PolicyFileError, TrainingError
+from baselines.policy_file import DESCRIPTION, WEIGHTS
+from baselines.saved import SHIPPED
+from controllers import GainError
+from tests.mutations import Touch, copied, mutate
+
+TRIES = int(os.environ.get("EXAMPLES", "150"))
+REFUSED = (ArtdeGymError, GainError)
+
+
+def test_a_damaged_policy_is_loaded_or_refused(tmp_path: Path) -> None:
+    """With the hash of the weights put right, since whoever means harm does that too."""
+    shutil.copytree(SHIPPED / "quadrotor-gale", tmp_path / "whole")
+    marker, rng = tmp_path / "executed", random.Random(0)
+    for _ in range(TRIES):
+        folder = copied(tmp_path / "whole", tmp_path / "damaged")
+        damage = [mutate(folder, rng, marker) for _ in range(rng.choice([1, 1, 2]))]
+        _right_hash(folder)
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", RuntimeWarning)
+                policy = baselines.load(folder)
+                policy.predict([0.0] * policy.residual.base._size)
+        except REFUSED:
+            pass
+        except Exception as error:
+            raise AssertionError(damage) from error
+        assert not marker.exists(), damage
+        assert {path.name for path in tmp_path.iterdir()} == {"whole", "damaged"}, damage
+
+
+def _right_hash(folder: Path) -> None:
+    weights, description = folder / WEIGHTS, folder / DESCRIPTION
+    if weights.is_file() and description.is_file():
+        try:
+            content = json.loads(description.read_text())
+            content["weights_sha256"] = hashlib.sha256(weights.read_bytes()).hexdigest()
+            description.write_text(json.dumps(content))
+        except (ValueError, TypeError, RecursionError):
+            return
+
+
+@pytest.mark.parametrize(
+    "recipe",
+    [
+        {"base": "tde+ppo", "gains": {"policies": {"QuadInfinity-Payload-v0": "/outside"}}},
+        {"base": "tde+ppo"},
+        {"gains": {"env": 1}},
+        {"gains": {"law": 3}},
+        {"gains": {"k_p_p": [1, 2, 3, 4]}},
+        {"base": "../outside"},
+    ],
+)
+def test_a_recipe_cannot_lead_elsewhere(recipe: dict[str, Any], tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(SHIPPED / "quadrotor-gale", tmp_path / "policy"))
+    content = json.loads((folder / DESCRIPTION).read_text())
+    content["recipe"] |= recipe
+    (folder / DESCRIPTION).write_text(json.dumps(content))
+    with pytest.raises(REFUSED):
+        baselines.load(folder)
+
+
+def test_a_damaged_run_is_continued_or_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("stable_baselines3")
+    import torch
+
+    from baselines import tasks
+    from baselines.recipe import Recipe
+    from baselines.run import Training
+    from baselines.train import train
+
+    name = "QuadInfinity-Payload-v0"
+    monkeypatch.setitem(tasks.TASKS, name, dataclasses.replace(tasks.TASKS[name], rollouts=2, episodes=1))
+    training = Training(
+        name, Recipe("q450"), steps=64, envs=4, test_every=1, env_kwargs={"duration": 1.0},
+        options={"n_steps": 8, "batch_size": 16},
+    )  # fmt: skip
+    train(training, tmp_path / "whole")
+    marker, rng = tmp_path / "executed", random.Random(1)
+    shutil.rmtree(tmp_path / "whole" / "tensorboard")
+    for _ in range(max(10, TRIES // 15)):
+        folder = copied(tmp_path / "whole", tmp_path / "damaged")
+        damage = mutate(folder, rng, marker)
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", RuntimeWarning)
+                train(training, folder)
+        except (*REFUSED, IsADirectoryError):
+            pass
+        except Exception as error:
+            raise AssertionError(damage) from error
+        assert not marker.exists(), damage
+    folder = copied(tmp_path / "whole", tmp_path / "damaged")
+    newest = sorted((folder / "checkpoints").iterdir())[-1]
+    torch.save({"policy": Touch(marker)}, newest / "parameters.pt")
+    with pytest.raises(TrainingError, match="checkpoint"):
+        train(training, folder)
+    assert not marker.exists()
+
+
+def test_a_policy_of_no_sense_is_named(tmp_path: Path) -> None:
+    (tmp_path / DESCRIPTION).write_text("[" * 100_000)
+    (tmp_path / WEIGHTS).write_bytes(b"")
+    with pytest.raises(PolicyFileError, match="RecursionError"):
+        baselines.load(tmp_path)

@@ -1,0 +1,163 @@
+"""Damage for files that we read: random, and such as knows the format and gets further in."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import random
+import shutil
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+WEIRD: list[Any] = [
+    None, True, -1, 0, 3, 10**30, 1e308, float("nan"), float("inf"), "", "x", "../../outside", "/outside", "a\x00b",
+    "<script>alert(1)</script>", [], [[]], [1, "a"], {}, {"": {}}, {"a": [None]}, "S2", "tde", "artde", "-" * 1000,
+]  # fmt: skip
+
+
+class Touch:
+    """A pickle that leaves a file behind where it is loaded."""
+
+    def __init__(self, marker: Path) -> None:
+        self.marker = marker
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Path.touch, (self.marker,)
+
+
+def mutate(folder: Path, rng: random.Random, marker: Path) -> str:
+    """Damage one file of a folder; returns which and how."""
+    file = rng.choice(sorted(path for path in folder.rglob("*") if path.is_file()))
+    kinds: list[Callable[[Path, random.Random], Any]] = [_truncated, _flipped, _inserted, _gone, _a_folder, _deep]
+    if file.suffix == ".json":
+        kinds += [_json] * 12
+    if file.suffix == ".csv":
+        kinds += [_cell] * 8 + [_row, _column] * 2
+    if file.suffix == ".npz":
+        kinds += [lambda path, rng: _arrays(path, rng, marker)] * 6
+    kind = rng.choice(kinds)
+    try:
+        return f"{file.relative_to(folder)}: {getattr(kind, '__name__', '')} {kind(file, rng)}"
+    except (ValueError, IndexError, StopIteration, zipfile.BadZipFile):
+        return "damaged before"
+
+
+def _truncated(file: Path, rng: random.Random) -> None:
+    content = file.read_bytes()
+    file.write_bytes(content[: rng.randrange(len(content) + 1)])
+
+
+def _flipped(file: Path, rng: random.Random) -> None:
+    content = bytearray(file.read_bytes())
+    for _ in range(rng.choice([1, 1, 1, 10])):
+        content[rng.randrange(len(content))] = rng.randrange(256)
+    file.write_bytes(bytes(content))
+
+
+def _inserted(file: Path, rng: random.Random) -> None:
+    content = file.read_bytes()
+    place = rng.randrange(len(content) + 1)
+    file.write_bytes(content[:place] + rng.choice([b"\n", b"\x00", b",", b'"', b"{", b"\xff\xfe", b"9" * 5000])
+                     + content[place:])  # fmt: skip
+
+
+def _gone(file: Path, rng: random.Random) -> None:
+    file.unlink()
+
+
+def _a_folder(file: Path, rng: random.Random) -> None:
+    file.unlink()
+    file.mkdir()
+
+
+def _deep(file: Path, rng: random.Random) -> None:
+    file.write_text("[" * 200_000)
+
+
+def _json(file: Path, rng: random.Random) -> str:
+    root = {"": json.loads(file.read_text())}
+    places: list[tuple[Any, Any]] = []
+
+    def collect(node: Any) -> None:
+        for key, value in list(node.items() if isinstance(node, dict) else enumerate(node)):
+            places.append((node, key))
+            if isinstance(value, (dict, list)):
+                collect(value)
+
+    collect(root)
+    node, key = rng.choice(places)
+    change = rng.choice(["replace", "replace", "replace", "delete", "rename"])
+    told = f"{change} {key!r}"
+    if change == "replace":
+        node[key] = rng.choice(WEIRD)
+        told += f" by {node[key]!r:.40}"
+    elif isinstance(node, dict) and node is not root:
+        value = node.pop(key)
+        if change == "rename":
+            node[str(rng.choice(WEIRD))] = value
+    file.write_text(json.dumps(root[""]))
+    return told
+
+
+def _table(file: Path) -> list[list[str]]:
+    return list(csv.reader(io.StringIO(file.read_text())))
+
+
+def _write(file: Path, rows: list[list[str]]) -> None:
+    buffer = io.StringIO()
+    csv.writer(buffer, lineterminator="\n").writerows(rows)
+    file.write_text(buffer.getvalue())
+
+
+def _cell(file: Path, rng: random.Random) -> str:
+    rows = _table(file)
+    row = rng.choice(rows)
+    place = rng.randrange(len(row))
+    before, row[place] = row[place], str(rng.choice(WEIRD))
+    _write(file, rows)
+    return f"{before!r} -> {row[place]!r:.40} in column {rows[0][place]!r}"
+
+
+def _row(file: Path, rng: random.Random) -> None:
+    rows = _table(file)
+    place = rng.randrange(len(rows))
+    rows[place : place + 1] = rng.choice([[], [rows[place]] * 2, [rows[place][:-1]], [[*rows[place], "1"]]])
+    _write(file, rows)
+
+
+def _column(file: Path, rng: random.Random) -> str:
+    rows = _table(file)
+    place = rng.randrange(len(rows[0]))
+    name = rows[0][place]
+    for row in rows:
+        del row[place]
+    _write(file, rows)
+    return name
+
+
+def _arrays(file: Path, rng: random.Random, marker: Path) -> str:
+    with np.load(file) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    name = rng.choice(sorted(arrays))
+    old = arrays.pop(name)
+    pickled = np.empty(1, dtype=object)
+    pickled[0] = Touch(marker)
+    new = rng.choice([
+        None, pickled, old[..., :-1], old[:1] * np.nan, old.astype("U3"), old.astype(np.complex128), np.float64(3.0),
+        np.zeros((0, 3)), np.sign(old).astype(np.int8), np.full_like(old, 3e38), old[None], old.T,
+    ])  # fmt: skip
+    if new is not None:
+        arrays[name] = new
+    np.savez(file, **arrays)
+    return f"{name} {'removed' if new is None else (np.shape(new), getattr(new, 'dtype', None))}"
+
+
+def copied(source: Path, target: Path) -> Path:
+    """A fresh copy of a folder."""
+    shutil.rmtree(target, ignore_errors=True)
+    return Path(shutil.copytree(source, target))
