@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import signal
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from artde_gym.cli import app
-from artde_gym.doctor import CHECKS, Outcome, examination, examine
+from artde_gym.doctor import CHECKS, examination, examine
 from artde_gym.doctor.machine import extras, files, python
 from artde_gym.errors import UnknownNameError
 from controllers.checkup import validity
@@ -39,37 +37,19 @@ def test_this_machine_is_well() -> None:
     assert not any(line["remedy"] for line in lines.values() if line["status"] == "ok")
 
 
-def raises() -> list[Outcome]:
-    raise RuntimeError("a broken package")
-
-
-def dies() -> list[Outcome]:
-    os.kill(os.getpid(), signal.SIGSEGV)
-    return []
-
-
-def exits() -> list[Outcome]:
-    sys.exit(3)
-
-
-def hangs() -> list[Outcome]:
-    signal.pause()
-    return []
-
-
 def test_no_check_ends_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
     """An exception, a crash, an exit and a hang: each is a line with a remedy, and exit code 1."""
     monkeypatch.setenv("PYTHONPATH", f"{Path(__file__).parent}:{os.environ.get('PYTHONPATH', '')}")
     monkeypatch.syspath_prepend(str(Path(__file__).parent))
     for name in ("raises", "dies", "exits", "hangs"):
-        monkeypatch.setitem(CHECKS, name, (name, f"test_doctor:{name}"))
+        monkeypatch.setitem(CHECKS, name, (name, f"broken_checks:{name}"))
     monkeypatch.setitem(CHECKS, "gone", ("gone", "artde_gym.nowhere:nothing"))
     names = ["raises", "dies", "exits", "gone", "files"]
     found = {name: report.outcomes for name, report in examine(names)}
     with monkeypatch.context() as hurry:
         hurry.setattr(examination, "PATIENCE", 0.5)
         found |= {name: report.outcomes for name, report in examine(["hangs"])}
-    for name, words in (("raises", "a broken package (test_doctor.py"), ("dies", "exit code -11"),
+    for name, words in (("raises", "a broken package (broken_checks.py"), ("dies", "exit code -11"),
                         ("exits", "exit code 3"), ("hangs", "no answer"), ("gone", "ModuleNotFoundError")):  # fmt: skip
         (line,) = found[name]
         assert (line.status, words in line.found, bool(line.remedy)) == ("failed", True, True), line
