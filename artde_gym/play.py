@@ -31,7 +31,10 @@ DIRECTIONS: dict[str, Vector] = {
     "right": (0.0, -1.0, 0.0),
 }
 """Key -> where it pushes: ahead, back, to the robot's left, to its right."""
-HELP = "arrows: push   + -: harder, softer   d: drop   , .: slower, faster   space: pause   r: reset   q: quit"
+HELP = (
+    "arrows or click: push   + -: harder, softer   d: drop payload",
+    ", .: slower, faster   space: pause   r: reset   q: quit",
+)
 
 
 class Viewer(Protocol):
@@ -159,7 +162,7 @@ class Session:
             self._window.follow(place)
         status = self.status()
         if math.dist(place, self._seen) > VIEW or status != self._status:
-            self._window.write([status, HELP], place)
+            self._window.write([status, *HELP], place)
             self._seen, self._status = place, status
 
     def _push(self, site: str, direction: Vector) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import html.parser
 import os
@@ -16,8 +17,9 @@ import gymnasium as gym
 import nbformat
 import numpy as np
 import pytest
+import typer
 import typer.main
-from documentation.blocks import Block, blocks, commands, script
+from documentation.blocks import Block, blocks, commands, mentions, script
 from documentation.figures import FIGURES
 from documentation.notebooks import NOTEBOOKS, notebook
 from documentation.pages import ROOT, generated
@@ -37,6 +39,7 @@ PAGES = {
     **generated(),
 }
 COMMANDS = {" ".join(words): words for text in (README, *PAGES.values()) for words in commands(text)}
+MENTIONS = {" ".join(words): words for text in (README, *PAGES.values()) for words in mentions(text)}
 
 
 def scripts() -> dict[str, str]:
@@ -82,7 +85,8 @@ def test_a_page_is_taken_apart_and_put_together():
     assert [part.language for part in parts] == ["markdown", "python", "markdown", "sh", "markdown", "text", "markdown"]
     assert parts[3] == Block("sh", "artde-gym list\n", "slow")
     assert script(parts) == "x = 1\n"
-    assert commands(page) == [["list"], ["report", "a", "--x"], ["tune", "--trials", "3"]]
+    assert commands(page) == [["list"]]
+    assert mentions(page) == [["report", "a", "--x"], ["tune", "--trials", "3"]]
 
 
 def test_a_failing_command_fails_its_script(tmp_path):
@@ -93,7 +97,8 @@ def test_a_failing_command_fails_its_script(tmp_path):
 def test_there_is_enough_to_run():
     assert len([name for name in SCRIPTS if name.startswith("README")]) >= 3
     assert len([name for name in SCRIPTS if name.startswith("tutorials")]) >= 3
-    assert len(COMMANDS) >= 10
+    assert len(COMMANDS) >= 5
+    assert len(MENTIONS) >= 10
 
 
 @pytest.mark.parametrize("name", SCRIPTS)
@@ -101,16 +106,24 @@ def test_code_runs(name, tmp_path):
     run(SCRIPTS[name], tmp_path)
 
 
+def parse(words: list[str]) -> None:
+    """By the real command line, up to where it would begin to work."""
+    whole = typer.main.get_group(app)
+    context = whole.make_context("artde-gym", list(words), resilient_parsing=True)
+    name, command, rest = whole.resolve_command(context, list(words))
+    assert command is not None
+    command.make_context(name, rest)
+
+
 @pytest.mark.parametrize("words", COMMANDS.values(), ids=COMMANDS)
 def test_command_parses(words):
-    """By the real command line, up to where it would begin to work; a lone name only has to be a command's."""
-    whole = typer.main.get_group(app)
-    name, command, rest = whole.resolve_command(
-        whole.make_context("artde-gym", list(words), resilient_parsing=True), list(words)
-    )
-    assert command is not None
-    if rest:
-        command.make_context(name, rest)
+    parse(words)
+
+
+@pytest.mark.parametrize("words", MENTIONS.values(), ids=MENTIONS)
+def test_mentioned_command_parses_as_far_as_it_goes(words):
+    with contextlib.suppress(typer.BadParameter):  # of which a missing one is a kind; an unknown option is none
+        parse(words)
 
 
 @pytest.mark.parametrize("page", NOTEBOOKS)
@@ -218,6 +231,11 @@ def test_page_of_an_environment_has_its_whole_layout(env_id):
     for scenario in SCENARIOS.values():
         assert (f"| {scenario.name} |" in page) == (scenario.env_id == env_id)
     assert not re.search(r"{(default|observation|shared)}", page)
+
+
+def test_an_option_that_is_none_is_found():
+    with pytest.raises(typer.TyperException, match="--episods"):
+        parse(["evaluate", "--episods", "3"])
 
 
 def test_every_law_has_a_page_with_its_code_and_a_figure():

@@ -12,6 +12,7 @@ SECTIONS: dict[str, str] = {
     "walk": "artde_gym.benchmark.walk:walking",
     "flight": "artde_gym.benchmark.flight:flying",
     "fleet": "artde_gym.benchmark.flight:fleets",
+    "herd": "artde_gym.benchmark.herd:herds",
     "reset": "artde_gym.benchmark.reset:resetting",
     "controllers": "artde_gym.benchmark.calls:calling",
     "inference": "baselines.benchmark:inference",

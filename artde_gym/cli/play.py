@@ -39,11 +39,12 @@ def play(
 
     kwargs = environment_kwargs(env_kwargs, engine)
     (cell,) = cells_of(env, scenario, kwargs, optional_json("--disturbances", disturbances))
-    plant = single(cell.env_id, json.dumps(cell.kwargs))
-    policy = make_controller(controller, plant, **json_object("--gains", gains))
-    window = Window(plant.unwrapped.engine.spec)
-    print(f"{HELP}\nclick: push away from you, at the nearest place on the robot")
+    window = Window()
     try:
+        plant = single(cell.env_id, json.dumps(cell.kwargs))
+        policy = make_controller(controller, plant, **json_object("--gains", gains))
+        window.load(plant.unwrapped.engine.spec)
+        print("\n".join((*HELP, "A click pushes away from you, at the nearest place on the robot.")))
         Session(plant, policy, window, controller, seed).run()
     finally:
         window.close()

@@ -25,7 +25,7 @@ from artde_gym.sim.rotation import rotated
 PATIENCE = 60.0  # s, for a first window to open
 NEAR_CLICK = 60.0  # pixels, that a click may be off what it is meant for
 INK, RED = (0.1, 0.12, 0.14), (0.77, 0.09, 0.24)
-ABOVE = 0.7  # m, of the words above what the camera looks at
+ABOVE = 0.55  # m, of the words above what the camera looks at
 LIGHT = 3.0  # of the sun's vector, to the lamp
 LASTING = 0.4  # s, that an arrow stays
 _AWAY: Vector = (0.0, 0.0, -10.0)  # under the ground
@@ -66,19 +66,18 @@ def require_window() -> None:
 class Window:
     """A window onto the world of an engine, whichever it is: it shows what `show` says, and simulates nothing.
 
-    Args:
-        spec: of the robot.
+    Open it before the first engine of a process: Bullet's window stays black beside an older client. Then `load`.
 
     Raises:
         OptionError: without a display, or without OpenGL on it.
     """
 
-    def __init__(self, spec: RobotSpec) -> None:
+    def __init__(self) -> None:
         require_window()
-        self._spec = spec
         number = bullet.connect(bullet.GUI)
         self._client: dict[str, Any] = {"physicsClientId": number}
         self._words: list[int] = []
+        self._down: set[int] = set()
         hidden = (
             bullet.COV_ENABLE_GUI,
             bullet.COV_ENABLE_KEYBOARD_SHORTCUTS,
@@ -87,6 +86,10 @@ class Window:
         )
         for flag in hidden:
             bullet.configureDebugVisualizer(flag, 0, **self._client)
+
+    def load(self, spec: RobotSpec) -> None:
+        """Build ground, payload and robot, and begin to draw."""
+        self._spec = spec
         data = Path(pybullet_data.getDataPath())
         ground = self._body(bullet.GEOM_MESH, fileName=str(data / "plane100.obj"))
         checks = bullet.loadTexture(str(data / "checker_blue.png"), **self._client)
@@ -126,10 +129,16 @@ class Window:
 
     def pressed(self) -> list[str]:
         """Keys that were pressed since this was last asked: "left", "right", "up", "down", "space", or a character."""
-        pressed = [
-            key for key, state in bullet.getKeyboardEvents(**self._client).items() if state & bullet.KEY_WAS_TRIGGERED
-        ]
-        return [_KEYS.get(key) or chr(key) for key in pressed if key in _KEYS or 32 < key < 127]
+        new = []
+        for key, state in bullet.getKeyboardEvents(**self._client).items():
+            if state & bullet.KEY_WAS_TRIGGERED:
+                self._down.add(key)
+                new.append(key)
+            elif state & bullet.KEY_WAS_RELEASED:
+                if key not in self._down:  # pressed and released between two questions: Bullet tells of the last only
+                    new.append(key)
+                self._down.discard(key)
+        return [_KEYS.get(key) or chr(key) for key in new if key in _KEYS or 32 < key < 127]
 
     def clicked(self, points: Sequence[Vector]) -> int | None:
         """Which of some points (m) the left button was pressed at since this was last asked."""
@@ -170,7 +179,7 @@ class Window:
         """Show lines of words above a place (m), in place of those before."""
         x, y, z = place
         for number, line in enumerate(lines):
-            at = (x, y, z + ABOVE - _LINE * number)
+            at = (x, y, z + ABOVE + _LINE * (len(lines) - number))
             more = {"replaceItemUniqueId": self._words[number]} if number < len(self._words) else {}
             item = bullet.addUserDebugText(line, at, INK, 1.2, **more, **self._client)
             self._words[number : number + 1] = [item]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from collections.abc import Iterable
 from typing import NamedTuple
 
 FENCE = re.compile(r"^```[ ]*(?P<language>\w*)[^\n]*\n(?P<text>.*?)^```[ ]*$", re.DOTALL | re.MULTILINE)
@@ -45,11 +46,21 @@ def script(parts: list[Block]) -> str:
 
 
 def commands(markdown: str) -> list[list[str]]:
-    """The words after `artde-gym` of all its calls, in shell blocks, indented lines and code spans."""
-    shell = [part.text for part in blocks(markdown) if part.language == "sh"]
+    """The words after `artde-gym` of its calls in shell blocks."""
+    return _calls(line for part in blocks(markdown) if part.language == "sh" for line in _lines(part.text))
+
+
+def mentions(markdown: str) -> list[list[str]]:
+    """Those of its calls in indented lines and code spans, which may leave out what is clear."""
     prose = [part.text for part in blocks(markdown) if part.language == "markdown"]
-    lines = [line for text in shell for line in text.replace("\\\n", " ").splitlines()]
-    indented = [line.strip() for text in prose for line in text.replace("\\\n", " ").splitlines() if line[:4] == "    "]
+    indented = [line.strip() for text in prose for line in _lines(text) if line[:4] == "    "]
     spans = [span.replace("\n", " ") for text in prose for span in re.findall(r"`([^`]+)`", text)]
-    calls = [shlex.split(line, comments=True) for line in (*lines, *indented, *spans) if line.startswith("artde-gym ")]
-    return [call[1:] for call in calls]
+    return _calls([*indented, *spans])
+
+
+def _lines(text: str) -> list[str]:
+    return text.replace("\\\n", " ").splitlines()
+
+
+def _calls(lines: Iterable[str]) -> list[list[str]]:
+    return [shlex.split(line, comments=True)[1:] for line in lines if line.startswith("artde-gym ")]

@@ -304,7 +304,7 @@ def test_bad_resets_and_steps() -> None:
     env = make(2, disturbances={})
     with pytest.raises(gym.error.ResetNeeded):
         env.step(np.zeros((2, 4)))
-    with pytest.raises(OptionError, match="seeds"):
+    with pytest.raises(OptionError, match=r"seed is \[1, 2, 3\]"):
         env.reset(seed=[1, 2, 3])
     with pytest.raises(OptionError, match="reset_mask"):
         env.reset(options={"reset_mask": np.array([True, False])})  # the other one has never begun
