@@ -315,7 +315,14 @@ def test_command_prints_ours_beside_the_thesis(tmp_path: Path) -> None:
     ):
         assert word in outcome.output
     listing = CliRunner().invoke(app, ["list"]).output
-    for word in ("BipedWalk-Payload-v0", "S2-L4", "artde-robust", "computed-torque", "single, batch", "wind.scale"):
+    for word in (
+        "BipedWalk-Payload-v0",
+        "S2-L4",
+        "artde-robust",
+        "computed-torque",
+        "bullet, mujoco, batch",
+        "wind.scale",
+    ):
         assert word in listing
 
 
