@@ -38,7 +38,9 @@ print(info["reward_terms"])
 def generated() -> dict[str, str]:
     """Path in docs/ -> Markdown."""
     pages = {f"environments/{env_id}.md": environment(env_id) for env_id in ours()}
-    pages |= {f"policies/{card.parent.name}.md": card.read_text(encoding="utf-8") for card in cards()}
+    pages |= {
+        f"policies/{card.parent.name}.md": _moved(card.read_text(encoding="utf-8"), r"\.\./", "") for card in cards()
+    }
     pages["results.md"] = _part_of_readme("What holds so far")
     pages["changelog.md"] = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     return pages
@@ -96,5 +98,9 @@ def _part_of_readme(title: str) -> str:
     found = re.search(rf"^## {title}\n(.*?)(?=^## )", text, re.DOTALL | re.MULTILINE)
     if found is None:
         raise ValueError(f"README.md has no part {title!r}")
-    body = found[1].replace("](docs/", "](")
-    return f"# {title}\n{body}"
+    return f"# {title}\n" + _moved(found[1], r"baselines/policies/", "policies/").replace("](docs/", "](")
+
+
+def _moved(text: str, before: str, after: str) -> str:
+    """Links to model cards in a folder, turned into links to their pages."""
+    return re.sub(rf"\]\({before}([\w-]+)/README\.md", rf"]({after}\1.md", text)
