@@ -138,7 +138,7 @@ walk.
 | `self_collision` | False | False, True | whether the feet stop each other, or overlap |
 | `speed` | 0.1 | 0 to 0.25 m/s | walking speed |
 | `step_duration` | 1.0 | 0.6 to 2 s | time of one step |
-| `duration` | 58.0 | 0.1 to 600 s | length of the walk |
+| `duration` | 58.0 | 0.1 to 1800 s | length of the walk |
 | `observe_ground_force` | False | False, True | append the ground's force on each foot to the observation |"""
 """What all pages share, with `{observation}` and `{default}` to be filled in; arguments of their own follow."""
 

@@ -37,7 +37,7 @@ DOUBLE_SUPPORT = 0.2  # share of a step
 STEP_HEIGHT = 0.04  # m
 GRID = 0.005  # s, of the pendulum problem and of the spline knots
 PASSES = 5  # of the multibody correction
-LONGEST = 600.0  # s, of a walk; it takes 1.5 MB a second, and 3 % of its time to plan
+LONGEST = 1800.0  # s, of a walk; it takes 1.5 MB a second, and 3 % of its time to plan
 
 _HIPS = np.array([[0.0, robot.HIP_OFFSET, 0.0], [0.0, -robot.HIP_OFFSET, 0.0]])
 
@@ -87,7 +87,7 @@ def walking_pattern(
 
     Raises:
         OptionError: a speed outside 0 to 0.25 m/s, a step outside 0.6 to 2 s, a step longer than 0.25 m, a walk
-            outside 0.1 to 600 s, or a period outside 1e-6 to 0.1 s.
+            outside 0.1 to 1800 s, or a period outside 1e-6 to 0.1 s.
     """
     speed = number("speed", speed, 0.0, 0.25, "0 to 0.25 m/s")
     step_duration = number("step_duration", step_duration, 0.6, 2.0, "0.6 to 2 s")
