@@ -14,8 +14,8 @@ from artde_gym.evaluation.provenance import provenance
 INTRODUCTION = """\
 # Benchmark
 
-Times are one machine's; ratios, which have no unit, were measured in one run, all variants in turns, and hold on others,
-too. A target that was missed is marked. The same command writes this page on your machine:
+Times are one machine's; ratios, which have no unit, were measured in one run, all variants in turns, and hold
+elsewhere, too. A target that was missed is marked. The same command writes this page on your machine:
 
     {command}
 
