@@ -46,18 +46,8 @@ def main() -> None:
         good &= ran(fuzz, EXAMPLES=str(options.examples))
     if "kills" in parts:
         with tempfile.TemporaryDirectory() as folder:
-            good &= ran(
-                [
-                    sys.executable,
-                    "scripts/sweep_faults.py",
-                    "--episodes",
-                    "200",
-                    "--kills",
-                    "50",
-                    "--out",
-                    f"{folder}/sweep",
-                ]
-            )
+            campaign = ["scripts/sweep_faults.py", "--episodes", "200", "--kills", "50", "--out"]
+            good &= ran([sys.executable, *campaign, f"{folder}/sweep"])
     print("all held" if good else "something did not hold")
     sys.exit(0 if good else 1)
 

@@ -84,9 +84,9 @@ def _aviary() -> _Flyer:
 def _crazyflow() -> _Flyer:
     os.environ.setdefault("JAX_PLATFORMS", "cpu")
     importlib.import_module("crazyflow.envs")  # registers its environments
-    env = gym.make_vec("DroneReachPos-v0", num_envs=MANY)
-    space: Any = env.unwrapped.single_action_space
+    env: Any = gym.make_vec("DroneReachPos-v0", num_envs=MANY)
+    space = env.unwrapped.single_action_space
     action = np.repeat(((space.low + space.high) / 2)[None], MANY, axis=0)
-    flyer = _Flyer(env, 1 / env.unwrapped.sim.freq, action)  # pyright: ignore[reportAttributeAccessIssue]
+    flyer = _Flyer(env, 1 / env.unwrapped.sim.freq, action)
     flyer._advance()  # compiles
     return flyer

@@ -8,6 +8,7 @@ import importlib.util
 import os
 import shutil
 import subprocess
+from typing import Any
 
 import gymnasium as gym
 
@@ -29,14 +30,14 @@ def _picture(engine: str, written: str) -> Outcome:
     if engine == "mujoco" and importlib.util.find_spec("mujoco") is None:
         return Outcome(what, "missing", "MuJoCo is not installed", "pip install 'artde-gym[mujoco]'")
     try:
-        env = gym.make("QuadInfinity-Payload-v0", disable_env_checker=True, duration=3.0, engine=engine,
+        env: Any = gym.make("QuadInfinity-Payload-v0", disable_env_checker=True, duration=3.0, engine=engine,
                        render_mode="rgb_array")  # fmt: skip
         env.reset(seed=0)
         picture = env.render()
         env.close()
     except OptionError as error:
         return Outcome(what, "missing", "no OpenGL without a display", str(error.allowed))
-    height, width, _ = picture.shape  # pyright: ignore[reportAttributeAccessIssue, reportOptionalMemberAccess]
+    height, width, _ = picture.shape
     return Outcome(what, "ok", f"{width} x {height}, without a display")
 
 
