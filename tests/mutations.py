@@ -44,7 +44,7 @@ def mutate(folder: Path, rng: random.Random, marker: Path) -> str:
     kind = rng.choice(kinds)
     try:
         return f"{file.relative_to(folder)}: {getattr(kind, '__name__', '')} {kind(file, rng)}"
-    except (ValueError, IndexError, StopIteration, zipfile.BadZipFile):
+    except (ValueError, IndexError, RecursionError, StopIteration, zipfile.BadZipFile):
         return "damaged before"
 
 
@@ -146,7 +146,7 @@ def _column(file: Path, rng: random.Random) -> str:
 
 
 def _arrays(file: Path, rng: random.Random, marker: Path) -> str:
-    with np.load(file) as stored:
+    with np.load(io.BytesIO(file.read_bytes())) as stored:
         arrays = {name: stored[name] for name in stored.files}
     name = rng.choice(sorted(arrays))
     old = arrays.pop(name)
