@@ -34,11 +34,19 @@ import numpy as np
 from controllers.laws.attitude import attitude_error, desired_axes, desired_rates, heading
 from controllers.laws.errors import GainError
 from controllers.laws.second_order import FilterMemory, second_order
-from controllers.laws.tracking import Array, Law, Signals, check_positive_number, errors, is_finite, times
+from controllers.laws.tracking import (
+    Array,
+    Law,
+    Signals,
+    check_positive_number,
+    components,
+    errors,
+    is_finite,
+    times,
+)
 from controllers.laws.vectors import (
     Axes,
     Vector,
-    components,
     cross,
     dot,
     joined,
