@@ -72,12 +72,11 @@ class QuadrotorPolicy(Policy):
     def step(self, memory: Any, signals: Flight, observation: Array) -> tuple[Array, Memory]:
         return cascade(self._position, self._attitude, self.gains, memory, signals, self._period)
 
-    def diagnostics(self, state: Any) -> dict[str, Array]:
-        """What the memory tells of the inside.
+    def remembered(self, state: Any) -> dict[str, Array]:
+        """What the memory holds of the inside.
 
         Of each loop what its law has (sigma, s, beta, c, ...), by name with the suffix `_p` (position) or `_q`
-        (attitude); `force_command` (..., 3), tau_p (N, world axes); `attitude_error` (..., 3), desired minus actual
-        roll, pitch and yaw (rad), each within -pi and pi.
+        (attitude); `force_command` (..., 3), tau_p (N, world axes).
         """
         memory: CascadeMemory = state
         named = {
@@ -85,10 +84,15 @@ class QuadrotorPolicy(Policy):
             for loop, suffix in LOOPS.items()
             for name, value in flatten(getattr(memory, loop)).items()
         }
-        error = _roll_pitch_yaw(memory.axes_ref) - _roll_pitch_yaw(memory.axes)
-        named["attitude_error"] = np.asarray(np.remainder(error + np.pi, 2 * np.pi) - np.pi)
         named["force_command"] = memory.force
         return named
+
+    def diagnostics(self, state: Any) -> dict[str, Array]:
+        """What is remembered; `attitude_error` (..., 3), desired minus actual roll, pitch and yaw (rad), -pi to pi."""
+        memory: CascadeMemory = state
+        error = _roll_pitch_yaw(memory.axes_ref) - _roll_pitch_yaw(memory.axes)
+        wrapped = np.asarray(np.remainder(error + np.pi, 2 * np.pi) - np.pi)
+        return {**self.remembered(state), "attitude_error": wrapped}
 
 
 def _roll_pitch_yaw(axes: Axes) -> Array:
