@@ -32,11 +32,9 @@ def inference(quick: bool) -> Section:
     for folder in sorted(file.parent for file in SHIPPED.glob(f"*/{DESCRIPTION}")):
         times = _times(folder, ROUNDS // 10 if quick else ROUNDS)
         figures += [
-            Figure(f"{folder.name}: a call, every control period", times["policy"], "us"),
-            Figure(
-                f"{folder.name}: what the residual adds to its base", times["policy"] - times["base"], "us", most=CALL
-            ),
-            Figure(f"{folder.name}: its network alone, every decision", times["network"], "us", most=CALL),
+            Figure(f"{folder.name}: a call, every control period", times["policy"], "us", most=CALL),
+            Figure(f"{folder.name}: what the residual adds to its base", times["policy"] - times["base"], "us"),
+            Figure(f"{folder.name}: its network alone, every decision", times["network"], "us"),
         ]
     text = "Mean of `predict` over whole decisions of a closed loop, one environment, one core, NumPy alone."
     return Section("Inference of trained policies", text, tuple(figures))

@@ -35,7 +35,7 @@ class Coupling(Protocol):
 
         Args:
             observation: of the environment.
-            inside: the base's diagnostics after the sample before.
+            inside: what the base remembers of the sample before, and what it is about to see.
             memory: of the call before.
         """
         ...

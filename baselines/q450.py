@@ -104,7 +104,7 @@ class Q450Coupling:
 
     def observe(self, observation: Array, inside: Mapping[str, Array], memory: Q450Memory) -> tuple[Array, Q450Memory]:
         e, ed = self._errors(observation)
-        nothing = np.zeros_like(e)
+        nothing = np.zeros(e.shape, e.dtype)
         s = nothing if self._gains is None else sliding_variable(e, ed, *self._gains)
         e_q, e_w, c = inside.get("e_q", nothing), inside.get("e_w", nothing), inside.get("c_p")
         parts = [
@@ -127,7 +127,7 @@ class Q450Coupling:
 
     def advance(self, memory: Q450Memory) -> tuple[Array, Q450Memory]:
         du = (self._limit * memory.action).astype(memory.action.dtype, copy=False)
-        return (np.concatenate([np.zeros_like(du), du], axis=-1) if self._attitude_alone else du), memory
+        return (np.concatenate([np.zeros(du.shape, du.dtype), du], axis=-1) if self._attitude_alone else du), memory
 
     def reward_terms(self, observation: Array, memory: Q450Memory, fell: Any) -> dict[str, Array]:
         e, ed = self._errors(observation)

@@ -68,7 +68,7 @@ class Residual:
     def observe(self, observation: Array, memory: ResidualMemory) -> tuple[Array, ResidualMemory]:
         """What the agent sees (..., n_features), and memory."""
         inside = {
-            **self.base.diagnostics(memory.base),
+            **self.base.remembered(memory.base),
             **self.base.upcoming(memory.base, self.base.read(observation)),
         }
         features, coupling = self.coupling.observe(observation, inside, memory.coupling)
@@ -132,6 +132,9 @@ class ResidualPolicy(Policy):
     def upcoming(self, state: Any, signals: _Signals) -> dict[str, Array]:
         base = self.residual.base
         return base.upcoming(state.residual.base, base.read(signals.observation))
+
+    def remembered(self, state: Any) -> dict[str, Array]:
+        return self.residual.base.remembered(state.residual.base)
 
     def diagnostics(self, state: Any) -> dict[str, Array]:
         """What the base tells, and the agent's `action` and, on the biped, `gate`."""

@@ -107,9 +107,13 @@ class Policy(abc.ABC):
         clipped = np.minimum(np.maximum(force, self._low), self._high)
         return clipped if clipped.dtype == force.dtype else clipped.astype(force.dtype), state
 
-    def diagnostics(self, state: Memory) -> dict[str, Array]:
-        """What the memory tells of the law's inside, by name: sigma, s, beta, c, ..., as far as it has them."""
+    def remembered(self, state: Memory) -> dict[str, Array]:
+        """What the memory holds of the law's inside, by name: sigma, s, beta, c, ..., as far as it has them."""
         return flatten(state)
+
+    def diagnostics(self, state: Memory) -> dict[str, Array]:
+        """What is remembered and what follows from it, for those who look on."""
+        return self.remembered(state)
 
     def upcoming(self, state: Memory, signals: Any) -> dict[str, Array]:
         """What the next step is about to see, by name, where the observation alone does not tell it."""
@@ -145,5 +149,8 @@ def flatten(memory: Any) -> dict[str, Array]:
     """All arrays in nested named tuples by their names."""
     named: dict[str, Array] = {}
     for name, value in memory._asdict().items():
-        named.update(flatten(value) if isinstance(value, tuple) else {name: value})
+        if isinstance(value, tuple):
+            named.update(flatten(value))
+        else:
+            named[name] = value
     return named

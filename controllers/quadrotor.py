@@ -32,30 +32,28 @@ class QuadrotorPolicy(Policy):
         own = {"position": position(gains.position, period), "attitude": attitude(gains.attitude, period)}
         super().__init__(name, plant, dataclasses.replace(gains, **own))
         self._period = period
-        self._fields = plant.observation
+        self._at = plant.observation.slices
 
     def read(self, observation: Array) -> Flight:
-        columns = np.ascontiguousarray(np.moveaxis(observation, -1, 0))
-        fields, last = self._fields, (*range(1, columns.ndim), 0)
-
-        def vector(name: str) -> Array:
-            return columns[fields[name]].transpose(last)
-
-        rotation, wrench = columns[fields["rot_body_to_world"]], columns[fields["wrench_applied"]]
+        last = observation.ndim - 1
+        columns = np.ascontiguousarray(observation.transpose(last, *range(last)))
+        rows = columns.transpose(*range(1, last + 1), 0)
+        at = self._at
+        rotation, wrench = columns[at["rot_body_to_world"]], columns[at["wrench_applied"]]
         x, y, z = ((rotation[i], rotation[3 + i], rotation[6 + i]) for i in range(3))
         return Flight(
-            position=vector("position"),
-            velocity=vector("velocity"),
+            position=rows[..., at["position"]],
+            velocity=rows[..., at["velocity"]],
             axes=(x, y, z),
-            rates=vector("body_rates"),
-            position_ref=vector("position_ref"),
-            velocity_ref=vector("velocity_ref"),
-            acceleration_ref=vector("acceleration_ref"),
-            jerk_ref=vector("jerk_ref"),
-            yaw_ref=columns[fields["yaw_ref"]][0],
-            yaw_rate_ref=columns[fields["yaw_rate_ref"]][0],
+            rates=rows[..., at["body_rates"]],
+            position_ref=rows[..., at["position_ref"]],
+            velocity_ref=rows[..., at["velocity_ref"]],
+            acceleration_ref=rows[..., at["acceleration_ref"]],
+            jerk_ref=rows[..., at["jerk_ref"]],
+            yaw_ref=columns[at["yaw_ref"]][0],
+            yaw_rate_ref=columns[at["yaw_rate_ref"]][0],
             thrust_applied=wrench[0],
-            torque_applied=wrench[1:].transpose(last),
+            torque_applied=rows[..., at["wrench_applied"]][..., 1:],
         )
 
     def accelerated(self, signals: Flight, du: Array) -> Flight:
@@ -74,12 +72,11 @@ class QuadrotorPolicy(Policy):
     def step(self, memory: Any, signals: Flight, observation: Array) -> tuple[Array, Memory]:
         return cascade(self._position, self._attitude, self.gains, memory, signals, self._period)
 
-    def diagnostics(self, state: Any) -> dict[str, Array]:
-        """What the memory tells of the inside.
+    def remembered(self, state: Any) -> dict[str, Array]:
+        """What the memory holds of the inside.
 
         Of each loop what its law has (sigma, s, beta, c, ...), by name with the suffix `_p` (position) or `_q`
-        (attitude); `force_command` (..., 3), tau_p (N, world axes); `attitude_error` (..., 3), desired minus actual
-        roll, pitch and yaw (rad), each within -pi and pi.
+        (attitude); `force_command` (..., 3), tau_p (N, world axes).
         """
         memory: CascadeMemory = state
         named = {
@@ -87,10 +84,15 @@ class QuadrotorPolicy(Policy):
             for loop, suffix in LOOPS.items()
             for name, value in flatten(getattr(memory, loop)).items()
         }
-        error = _roll_pitch_yaw(memory.axes_ref) - _roll_pitch_yaw(memory.axes)
-        named["attitude_error"] = np.asarray(np.remainder(error + np.pi, 2 * np.pi) - np.pi)
         named["force_command"] = memory.force
         return named
+
+    def diagnostics(self, state: Any) -> dict[str, Array]:
+        """What is remembered; `attitude_error` (..., 3), desired minus actual roll, pitch and yaw (rad), -pi to pi."""
+        memory: CascadeMemory = state
+        error = _roll_pitch_yaw(memory.axes_ref) - _roll_pitch_yaw(memory.axes)
+        wrapped = np.asarray(np.remainder(error + np.pi, 2 * np.pi) - np.pi)
+        return {**self.remembered(state), "attitude_error": wrapped}
 
 
 def _roll_pitch_yaw(axes: Axes) -> Array:

@@ -34,11 +34,18 @@ import numpy as np
 from controllers.laws.attitude import attitude_error, desired_axes, desired_rates, heading
 from controllers.laws.errors import GainError
 from controllers.laws.second_order import FilterMemory, second_order
-from controllers.laws.tracking import Array, Law, Signals, check_positive_number, errors, is_finite, times
+from controllers.laws.tracking import (
+    Array,
+    Law,
+    Signals,
+    check_positive_number,
+    components,
+    is_finite,
+    times,
+)
 from controllers.laws.vectors import (
     Axes,
     Vector,
-    components,
     cross,
     dot,
     joined,
@@ -181,7 +188,8 @@ def cascade(
 def attitude_errors(gains: CascadeGains, memory: CascadeMemory, flight: Flight) -> tuple[Array, Array]:
     """e_q and e_w (..., 3) that the attitude law is about to see, for the command "filtered" exactly."""
     axes_ref, rates_ref = _attitude_command(memory.command, flight, 0.0)
-    return errors(_attitude_signals(gains, flight, axes_ref, rates_ref, scaled(0.0, rates_ref)))
+    q, qd_ref = _attitude_feedback(gains, flight, axes_ref, rates_ref, _carried(flight, axes_ref, rates_ref))
+    return 0.0 - q, qd_ref - flight.rates
 
 
 def _position_signals(flight: Flight, applied: Array) -> Signals:
@@ -227,19 +235,31 @@ def _attitude_signals(
     gains: CascadeGains, flight: Flight, axes_ref: Axes, rates_ref: Vector, turning: Vector
 ) -> Signals:
     """What the attitude law sees, see the top; `turning` is alpha_d."""
-    rates = components(flight.rates)
-    carried = to_body(flight.axes, to_world(axes_ref, rates_ref))
-    e = attitude_error(flight.axes, axes_ref)
-    feedforward = minus(to_body(flight.axes, to_world(axes_ref, turning)), cross(rates, carried))
-    if gains.attitude_error == "printed":
-        e = scaled(-2.0, e)
-        # e_q. = w - R_d^T R w_d
-        carried = plus(rates, minus(rates, to_body(axes_ref, to_world(flight.axes, rates_ref))))
-    q = joined(scaled(-1.0, e))
-    acceleration = joined(feedforward)
+    carried = _carried(flight, axes_ref, rates_ref)
+    q, qd_ref = _attitude_feedback(gains, flight, axes_ref, rates_ref, carried)
+    turning = _carried(flight, axes_ref, turning)
+    acceleration = joined(minus(turning, cross(components(flight.rates), carried)))
     if flight.turning_ref is not None:
         acceleration = acceleration + flight.turning_ref
-    return Signals(q, flight.rates, np.zeros_like(q), joined(carried), acceleration, flight.torque_applied)
+    return Signals(q, flight.rates, np.zeros_like(q), qd_ref, acceleration, flight.torque_applied)
+
+
+def _attitude_feedback(
+    gains: CascadeGains, flight: Flight, axes_ref: Axes, rates_ref: Vector, carried: Vector
+) -> tuple[Array, Array]:
+    """q and qd_ref of the attitude law; `carried` is R^T R_d w_d."""
+    e = attitude_error(flight.axes, axes_ref)
+    if gains.attitude_error == "printed":
+        e = scaled(-2.0, e)
+        rates = components(flight.rates)
+        # e_q. = w - R_d^T R w_d
+        carried = plus(rates, minus(rates, to_body(axes_ref, to_world(flight.axes, rates_ref))))
+    return joined(scaled(-1.0, e)), joined(carried)
+
+
+def _carried(flight: Flight, axes_ref: Axes, a: Vector) -> Vector:
+    """R^T R_d a: from the desired axes to the body's."""
+    return to_body(flight.axes, to_world(axes_ref, a))
 
 
 def _within_reach(gains: CascadeGains, force: Vector) -> Vector:

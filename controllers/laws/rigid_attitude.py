@@ -11,8 +11,8 @@ from __future__ import annotations
 import dataclasses
 
 from controllers.laws.computed_torque import ComputedTorqueGains, computed_torque
-from controllers.laws.tracking import Array, Gain, Signals, check_positive, times
-from controllers.laws.vectors import components, cross, joined
+from controllers.laws.tracking import Array, Gain, Signals, check_positive, components, times
+from controllers.laws.vectors import cross, joined
 
 
 @dataclasses.dataclass(frozen=True)

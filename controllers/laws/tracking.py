@@ -79,8 +79,14 @@ def smooth_sign(s: Array, eps: float) -> Array:
 def inner(v: Array, w: Array) -> Array:
     """v^T w over the last axis."""
     if v.shape[-1] == 3:  # faster by components, and the same in any memory order: vecdot rounds by strides
-        return v[..., 0] * w[..., 0] + v[..., 1] * w[..., 1] + v[..., 2] * w[..., 2]
+        (a, b, c), (x, y, z) = components(v), components(w)
+        return a * x + b * y + c * z
     return np.vecdot(v, w)
+
+
+def components(v: Array) -> tuple[Array, Array, Array]:
+    """The components of an array (..., 3)."""
+    return v[..., 0][()], v[..., 1][()], v[..., 2][()]  # numbers of one vector: ten times as fast as 0-d arrays
 
 
 def signed_step(size: Array, up: NDArray[np.bool_]) -> Array:

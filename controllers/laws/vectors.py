@@ -1,4 +1,4 @@
-"""Vectors in space as three components, each an array (...).
+"""Vectors in space as three components, each an array (...): what `controllers.laws.tracking.components` gives.
 
 Arithmetic on components rounds the same for one vector and for many, and runs along contiguous memory; products of
 stacked 3 x 3 matrices do neither. A rotation is its three columns: the body's axes in world axes.
@@ -56,8 +56,3 @@ def joined(a: tuple[Array, ...]) -> Array:
     """Components as one array (..., n), each component contiguous."""
     columns = np.array(a)
     return columns.transpose((*range(1, columns.ndim), 0))
-
-
-def components(a: Array) -> Vector:
-    """The components of an array (..., 3)."""
-    return a[..., 0], a[..., 1], a[..., 2]

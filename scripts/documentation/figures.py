@@ -22,8 +22,8 @@ from controllers.laws.computed_torque import ComputedTorqueGains
 from controllers.laws.positional_pid import PositionalPidGains
 from controllers.laws.rigid_attitude import rigid_attitude
 from controllers.laws.tde import ConstantGains, equivalent_gains
-from controllers.laws.tracking import Signals
-from controllers.laws.vectors import components, joined
+from controllers.laws.tracking import Signals, components
+from controllers.laws.vectors import joined
 from controllers.presets import PRESETS
 from documentation.plant import ARM, DURATION, LIFT, LOADED, PUSHED, Plant, Run, modelled, simulate
 

@@ -19,8 +19,8 @@ from controllers.laws.errors import GainError
 from controllers.laws.positional_pid import PositionalPidGains
 from controllers.laws.rigid_attitude import RigidAttitudeGains, rigid_attitude
 from controllers.laws.tde import TdeGains
-from controllers.laws.tracking import Array, Law, Memory, Signals
-from controllers.laws.vectors import components, joined, to_body, to_world
+from controllers.laws.tracking import Array, Law, Memory, Signals, components
+from controllers.laws.vectors import joined, to_body, to_world
 
 PERIOD = 0.015
 THESIS: dict[str, Any] = {"k_p": 10.0, "k_d": 5.0}
