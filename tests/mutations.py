@@ -9,6 +9,7 @@ import random
 import shutil
 import sys
 import zipfile
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -50,7 +51,7 @@ def mutate(folder: Path, rng: random.Random, marker: Path) -> str:
     kind = rng.choice(kinds)
     try:
         return f"{file.relative_to(folder)}: {getattr(kind, '__name__', '')} {kind(file, rng)}"
-    except (ValueError, IndexError, RecursionError, StopIteration, zipfile.BadZipFile, yaml.YAMLError):
+    except (ValueError, IndexError, RecursionError, StopIteration, zipfile.BadZipFile, zlib.error, yaml.YAMLError):
         return "damaged before"
 
 
@@ -185,10 +186,11 @@ def _arrays(file: Path, rng: random.Random, marker: Path) -> str:
     old = arrays.pop(name)
     pickled = np.empty(1, dtype=object)
     pickled[0] = Touch(marker)
-    new = rng.choice([
-        None, pickled, old[..., :-1], old[:1] * np.nan, old.astype("U3"), old.astype(np.complex128), np.float64(3.0),
-        np.zeros((0, 3)), np.sign(old).astype(np.int8), np.full_like(old, 3e38), old[None], old.T,
-    ])  # fmt: skip
+    with np.errstate(invalid="ignore"):  # of numbers that a change before this one has damaged
+        new = rng.choice([
+            None, pickled, old[..., :-1], old[:1] * np.nan, old.astype("U3"), old.astype(np.complex128),
+            np.float64(3.0), np.zeros((0, 3)), np.sign(old).astype(np.int8), np.full_like(old, 3e38), old[None], old.T,
+        ])  # fmt: skip
     if new is not None:
         arrays[name] = new
     np.savez(file, **arrays)
