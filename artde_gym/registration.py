@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import dataclasses
 import importlib
+import inspect
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import gymnasium as gym
 
-from artde_gym.errors import UnknownNameError, among
+from artde_gym.errors import OptionError, UnknownNameError, among
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,14 +74,20 @@ def registered_controllers() -> dict[str, ControllerSpec]:
     return dict(_controllers)
 
 
-def make_controller(name: str, env: Any, **overrides: Any) -> Any:
+def make_controller(name: str, env: Any, /, **overrides: Any) -> Any:
     """Build the controller called `name` for an environment; `overrides` replace its arguments and gains.
 
     Raises:
         UnknownNameError: if no controller has this name.
+        OptionError: for arguments that it does not take.
     """
     known = _known(name)
-    return resolved(known.entry_point)(env, **{**known.kwargs, **overrides})
+    make, arguments = resolved(known.entry_point), {**known.kwargs, **overrides}
+    try:
+        inspect.signature(make).bind(env, **arguments)
+    except TypeError as error:
+        raise OptionError(f"gains of {name!r}", overrides, f"arguments of {known.entry_point} ({error})") from error
+    return make(env, **arguments)
 
 
 def search_space(name: str, env: Any) -> dict[str, GainRange]:

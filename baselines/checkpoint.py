@@ -72,13 +72,14 @@ class Checkpoints:
         if "log_ent_coef" in parameters:
             model.log_ent_coef.data.copy_(parameters.pop("log_ent_coef"))
         model.set_parameters(parameters, device="cpu")
-        with np.load(folder / "normaliser.npz", allow_pickle=False) as arrays:
+        # NumPy leaves a damaged file open, if it was given its path
+        with (folder / "normaliser.npz").open("rb") as file, np.load(file, allow_pickle=False) as arrays:
             for name, values in {"observation": normaliser.obs_rms, "return": normaliser.ret_rms}.items():
                 for key in _STATISTICS:
                     stored = arrays[f"{name}_{key}"]
                     setattr(values, key, stored if stored.ndim else stored.item())
         if hasattr(model, "replay_buffer"):
-            with np.load(folder / "replay.npz", allow_pickle=False) as arrays:
+            with (folder / "replay.npz").open("rb") as file, np.load(file, allow_pickle=False) as arrays:
                 buffer = model.replay_buffer
                 buffer.pos, buffer.full = int(arrays["pos"]), bool(arrays["full"])
                 for name in _BUFFER:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from artde_gym.envs import biped_task, quadrotor_task
-from artde_gym.errors import ArtdeGymError, UnknownNameError, among
+from artde_gym.errors import ArtdeGymError, OptionError, UnknownNameError, among
 from artde_gym.robots.ojas import ActuatorInertia, ojas
 from artde_gym.robots.q450 import q450
 from artde_gym.robots.spec import RobotSpec
@@ -49,7 +49,11 @@ def make_shipped(env: Any, *, policies: dict[str, str]) -> ResidualPolicy:
 
     Raises:
         UnknownNameError: if there is none for the environment, or if Gymnasium did not make it and it has no id.
+        OptionError: for anything but names of policies of this package.
     """
+    known = [path.name for path in SHIPPED.iterdir()]
+    if not (isinstance(policies, dict) and all(name in known for name in policies.values())):
+        raise OptionError("policies", policies, f"a mapping of environments to {among(None, known)}")
     spec = env.get_attr("spec")[0] if hasattr(env, "num_envs") else env.unwrapped.spec
     env_id = "" if spec is None else spec.id
     if env_id not in policies:

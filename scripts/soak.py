@@ -1,4 +1,4 @@
-"""What the tests do in short, for hours: walks, short episodes, damaged files, random calls, kills.
+"""What the tests do in short, for hours: walks, short episodes, environments, damaged files, random calls, kills.
 
 make soak                                   everything, some hours
 make soak ARGS="walks --seconds 600"        one part
@@ -21,7 +21,7 @@ from artde_gym.benchmark.page import written
 ROOT = Path(__file__).parents[1]
 FUZZ = ("tests/artde_gym/test_properties.py", "tests/artde_gym/test_damaged_files.py",
         "tests/baselines/test_damaged_runs.py")  # fmt: skip
-PARTS = ("walks", "episodes", "environments", "fuzz", "kills")
+PARTS = ("walks", "episodes", "environments", "replacements", "fuzz", "kills")
 
 
 def main() -> None:
@@ -30,6 +30,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=3600.0, help="of simulated walking, in each engine")
     parser.add_argument("--episodes", type=int, default=10_000, help="short episodes in one process")
     parser.add_argument("--environments", type=int, default=1200, help="made one after the other")
+    parser.add_argument("--replacements", type=int, default=1200, help="of environments that are open beside others")
     parser.add_argument("--examples", type=int, default=2000, help="that each test of `fuzz` tries")
     options = parser.parse_args()
     parts = options.parts or PARTS
@@ -41,8 +42,10 @@ def main() -> None:
         good &= shown(endurance.starting(options.episodes, print))
     if "environments" in parts:
         good &= shown(endurance.making(options.environments, print))
+    if "replacements" in parts:
+        good &= shown(endurance.replacing(options.replacements, print))
     if "fuzz" in parts:
-        fuzz = [sys.executable, "-m", "pytest", "-q", "-x", *FUZZ]
+        fuzz = [sys.executable, "-m", "pytest", "-q", "-n", str(os.cpu_count()), *FUZZ]
         good &= ran(fuzz, EXAMPLES=str(options.examples))
     if "kills" in parts:
         with tempfile.TemporaryDirectory() as folder:

@@ -9,11 +9,13 @@ import random
 import shutil
 import sys
 import zipfile
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 
 WEIRD: list[Any] = [
     None, True, -1, 0, 3, 10**30, 1e308, float("nan"), float("inf"), "", "x", "../../outside", "/outside", "a\x00b",
@@ -33,10 +35,15 @@ class Touch:
 
 def mutate(folder: Path, rng: random.Random, marker: Path) -> str:
     """Damage one file of a folder; returns which and how."""
-    file = rng.choice(sorted(path for path in folder.rglob("*") if path.is_file()))
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    if not files:
+        return "gone before"
+    file = rng.choice(files)
     kinds: list[Callable[[Path, random.Random], Any]] = [_truncated, _flipped, _inserted, _gone, _a_folder, _deep]
     if file.suffix == ".json":
         kinds += [_json] * 12
+    if file.suffix == ".yaml":
+        kinds += [_yaml] * 12 + [lambda path, rng: _tagged(path, rng, marker)] * 4
     if file.suffix == ".csv":
         kinds += [_cell] * 8 + [_row, _column] * 2
     if file.suffix == ".npz":
@@ -44,7 +51,7 @@ def mutate(folder: Path, rng: random.Random, marker: Path) -> str:
     kind = rng.choice(kinds)
     try:
         return f"{file.relative_to(folder)}: {getattr(kind, '__name__', '')} {kind(file, rng)}"
-    except (ValueError, IndexError, RecursionError, StopIteration, zipfile.BadZipFile):
+    except (ValueError, IndexError, RecursionError, StopIteration, zipfile.BadZipFile, zlib.error, yaml.YAMLError):
         return "damaged before"
 
 
@@ -81,7 +88,35 @@ def _deep(file: Path, rng: random.Random) -> None:
 
 
 def _json(file: Path, rng: random.Random) -> str:
-    root = {"": json.loads(file.read_text())}
+    content, told = _changed(json.loads(file.read_text()), rng)
+    file.write_text(json.dumps(content))
+    return told
+
+
+def _yaml(file: Path, rng: random.Random) -> str:
+    content, told = _changed(yaml.safe_load(file.read_text()), rng)
+    file.write_text(yaml.safe_dump(content))
+    return told
+
+
+def _tagged(file: Path, rng: random.Random, marker: Path) -> str:
+    """A value that leaves a file behind where a loader makes objects of tags, or stands for another place."""
+    lines = file.read_text().splitlines()
+    number = rng.choice([number for number, line in enumerate(lines) if ":" in line])
+    before, colon, _ = lines[number].rpartition(": ")
+    value = rng.choice([
+        f"!!python/object/apply:pathlib.Path.touch [!!python/object/apply:pathlib.PosixPath [{marker}]]",
+        f"!!python/object/apply:os.system ['touch {marker}']", "!!python/name:os.system", "&x [*x]", "{<<: {a: 1}}",
+        "!!binary aGk=", "2020-01-01", "!!set {x}", "1:30", "0x10",
+    ])  # fmt: skip
+    lines[number] = f"{before}{colon}{value}" if colon else f"{lines[number]} {value}"
+    file.write_text("\n".join(lines))
+    return lines[number]
+
+
+def _changed(content: Any, rng: random.Random) -> tuple[Any, str]:
+    """Plain values with one of them replaced, removed or renamed; and which."""
+    root = {"": content}
     places: list[tuple[Any, Any]] = []
 
     def collect(node: Any) -> None:
@@ -101,8 +136,7 @@ def _json(file: Path, rng: random.Random) -> str:
         value = node.pop(key)
         if change == "rename":
             node[str(rng.choice(WEIRD))] = value
-    file.write_text(json.dumps(root[""]))
-    return told
+    return root[""], told
 
 
 def _table(file: Path) -> list[list[str]]:
@@ -152,10 +186,11 @@ def _arrays(file: Path, rng: random.Random, marker: Path) -> str:
     old = arrays.pop(name)
     pickled = np.empty(1, dtype=object)
     pickled[0] = Touch(marker)
-    new = rng.choice([
-        None, pickled, old[..., :-1], old[:1] * np.nan, old.astype("U3"), old.astype(np.complex128), np.float64(3.0),
-        np.zeros((0, 3)), np.sign(old).astype(np.int8), np.full_like(old, 3e38), old[None], old.T,
-    ])  # fmt: skip
+    with np.errstate(invalid="ignore"):  # of numbers that a change before this one has damaged
+        new = rng.choice([
+            None, pickled, old[..., :-1], old[:1] * np.nan, old.astype("U3"), old.astype(np.complex128),
+            np.float64(3.0), np.zeros((0, 3)), np.sign(old).astype(np.int8), np.full_like(old, 3e38), old[None], old.T,
+        ])  # fmt: skip
     if new is not None:
         arrays[name] = new
     np.savez(file, **arrays)

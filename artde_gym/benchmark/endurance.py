@@ -87,12 +87,41 @@ def making(count: int, told: Progress = lambda _: None) -> tuple[Figure, ...]:
             memory.append(resident())
         figures += _figures(f"{ENGINES[engine]}, {name}: {len(rates)} environments", rates, memory)
         told(f"{name} in {ENGINES[engine]}: {len(rates)} environments made")
-    gc.collect()
-    return (*figures, Figure("physics clients left open", float(open_clients() - clients), "clients", most=0.0))
+    return (*figures, _left_open(clients))
+
+
+def replacing(count: int, told: Progress = lambda _: None) -> tuple[Figure, ...]:
+    """So many environments, each in the place of an older one, while others of both engines are open; for an episode.
+
+    What engines give back so lies between what others hold, and the C library can use it again only if it fits.
+    """
+    places = [(name, engine) for name in _SHORT for engine in ENGINES]
+    clients = open_clients()
+    envs = [_made(name, engine) for name, engine in places]
+    rates, memory = [], []
+    for number in range(max(2, count // len(places))):
+        start = time.process_time()
+        for place, (name, engine) in enumerate(places):
+            envs[place].close()
+            envs[place] = env = _made(name, engine)
+            run_episode(env, make_controller("artde", env), number)
+        rates.append(len(places) / (time.process_time() - start))
+        memory.append(resident())
+        if number % 10 == 9:
+            told(f"{(number + 1) * len(places)} of {count} environments replaced")
+    for env in envs:
+        env.close()
+    figures = _figures(f"{len(rates) * len(places)} environments replaced", rates, memory)
+    return (*figures, _left_open(clients))
 
 
 def _made(name: str, engine: str) -> Any:
     return gym.make(name, disable_env_checker=True, engine=engine, **_SHORT[name]).unwrapped
+
+
+def _left_open(before: int) -> Figure:
+    gc.collect()
+    return Figure("physics clients left open", float(open_clients() - before), "clients", most=0.0)
 
 
 def _figures(what: str, rates: list[float], memory: list[int]) -> tuple[Figure, ...]:

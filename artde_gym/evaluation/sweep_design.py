@@ -165,9 +165,14 @@ def design(given: Mapping[str, Any]) -> Design:
     for name, value in fixed.items():
         _check_setting(name, value)
     grid, draws = _grid(given.get("grid", {})), _draws(given.get("sample"), fixed["seed"])
-    for path in grid:
+    for path, values in grid.items():
         if path in draws[0]:
             raise OptionError("path", path, "either in the grid or in the sample")
+        for value in values:
+            _check_at(path, value)
+    for draw in draws:
+        for path, value in draw.items():
+            _check_at(path, value)
     count = math.prod(map(len, grid.values())) * len(draws)
     if count > MOST_CELLS:
         raise OptionError("sweep", f"{count} cells", f"at most {MOST_CELLS}")
@@ -248,10 +253,7 @@ def _draw(path: str, distribution: Mapping[str, list[Any]], seed: int, number: i
 def _settings(fixed: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
     """The settings of one cell: the fixed ones, whole ones in their place, then single values inside."""
     settings = dict(fixed)
-    for path, value in values.items():
-        if path in SETTINGS:
-            _check_setting(path, value)
-            settings[path] = value
+    settings |= {path: value for path, value in values.items() if path in SETTINGS}
     for path, value in values.items():
         head, _, rest = path.partition(".")
         if path in SETTINGS:
@@ -303,6 +305,12 @@ def _check_path(path: str) -> None:
     depth = {"gains": 2, "env_kwargs": 1, "disturbances": 1}.get(head, 0)
     if path not in SETTINGS and not (depth and rest.count(".") >= depth - 1 and all(path.split("."))):
         raise UnknownNameError("path", path, among(path, [*SETTINGS, *INSIDE]))
+
+
+def _check_at(path: str, value: Any) -> None:
+    """What a path gets; values inside a setting are for those to check who know them."""
+    if path in SETTINGS:
+        _check_setting(path, value)
 
 
 def _check_setting(name: str, value: Any) -> None:

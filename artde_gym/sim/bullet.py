@@ -63,7 +63,7 @@ class BulletEngine:
         )
         self._ground = self._build_ground()
         self._robot = self._build_robot()
-        self._ball = bullet.createVisualShape(  # once: Bullet never frees a visual shape
+        self._ball = bullet.createVisualShape(  # of the payload, once: Bullet never frees a visual shape
             bullet.GEOM_MESH,
             fileName=str(Path(pybullet_data.getDataPath()) / "sphere_smooth.obj"),  # of radius 1
             meshScale=[PAYLOAD_LOOK] * 3,
@@ -250,7 +250,7 @@ class BulletEngine:
         center, quat = bullet.getBasePositionAndOrientation(self._robot, **client)
         offset = np.subtract(position, self._com)
         point = np.asarray(center) + _rotation(quat) @ offset
-        body = bullet.createMultiBody(mass, -1, self._ball, point.tolist(), quat, **client)
+        body = bullet.createMultiBody(mass, -1, -1, point.tolist(), quat, **client)  # its ball is in pictures only
         moment = 0.4 * mass * PAYLOAD_RADIUS**2
         bullet.changeDynamics(
             body, -1, localInertiaDiagonal=[moment] * 3, linearDamping=0.0, angularDamping=0.0, **client
@@ -285,6 +285,9 @@ class BulletEngine:
             camera.target, camera.distance, camera.yaw_deg, -camera.pitch_deg, 0.0, 2
         )
         lens = bullet.computeProjectionMatrixFOV(FIELD_OF_VIEW, camera.width / camera.height, NEAR, FAR)
+        payload, ball = self.payload_position(), None
+        if payload is not None:  # for this picture alone: to read the mesh of its ball takes longer than a reset
+            ball = bullet.createMultiBody(0.0, -1, self._ball, payload, physicsClientId=self._client)
         _, _, rgba, _, body = bullet.getCameraImage(
             camera.width,
             camera.height,
@@ -295,10 +298,12 @@ class BulletEngine:
             renderer=bullet.ER_TINY_RENDERER,
             physicsClientId=self._client,
         )
+        if ball is not None:
+            bullet.removeBody(ball, physicsClientId=self._client)
         size = (camera.height, camera.width)
         picture = np.asarray(rgba, dtype=np.uint8).reshape(*size, 4)[..., :3].copy()
         bare = np.isin(np.asarray(body).reshape(size), (-1, self._ground))
-        paint(picture, bare, camera, self._shadow.polygons(self.read(), self.payload_position()))
+        paint(picture, bare, camera, self._shadow.polygons(self.read(), payload))
         return picture
 
     def close(self) -> None:

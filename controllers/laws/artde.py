@@ -25,7 +25,7 @@ from controllers.laws.tracking import (
     Array,
     Signals,
     check_non_negative,
-    check_positive,
+    check_positive_number,
     desired_acceleration,
     errors,
     inner,
@@ -66,7 +66,7 @@ class ArtdeGains(TdeGains):
     def __post_init__(self) -> None:
         super().__post_init__()
         for field in ("alpha", "beta_floor", "eps"):
-            check_positive(field, getattr(self, field))
+            check_positive_number(field, getattr(self, field))
         for field in ("gamma_0", "gamma_1", "leakage"):
             check_non_negative(field, getattr(self, field))
         if not (is_finite(self.beta_start) and self.beta_start >= self.beta_floor):

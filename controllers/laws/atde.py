@@ -22,7 +22,7 @@ from controllers.laws.tracking import (
     Array,
     Signals,
     check_non_negative,
-    check_positive,
+    check_positive_number,
     desired_acceleration,
     errors,
     inner,
@@ -53,7 +53,7 @@ class AtdeGains(TdeGains):
     def __post_init__(self) -> None:
         super().__post_init__()
         for field in ("alpha", "c_floor", "eps"):
-            check_positive(field, getattr(self, field))
+            check_positive_number(field, getattr(self, field))
         check_non_negative("gamma_0", self.gamma_0)
         if not (is_finite(self.c_start) and self.c_start >= self.c_floor):
             raise GainError("c_start", self.c_start, f"a finite number >= c_floor = {self.c_floor:g}")

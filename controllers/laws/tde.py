@@ -26,6 +26,7 @@ from controllers.laws.tracking import (
     Signals,
     check_non_negative,
     check_positive,
+    check_positive_number,
     desired_acceleration,
     errors,
     make_plain,
@@ -128,9 +129,9 @@ class ConstantGains(TdeGains):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_positive("alpha", self.alpha)
+        check_positive_number("alpha", self.alpha)
         check_non_negative("c", self.c)
-        check_positive("eps", self.eps)
+        check_positive_number("eps", self.eps)
 
 
 def equivalent_gains(gains: ConstantGains) -> TdeGains:

@@ -105,6 +105,7 @@ def test_a_short_soak() -> None:
         *endurance.walking("mujoco", 3.0, told.append),
         *endurance.starting(90, told.append),
         *endurance.making(18, told.append),
+        *endurance.replacing(60, told.append),
     ]
     for figure in figures:
         if figure.unit in ("MB", "clients"):

@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 from artde_gym.errors import ArtdeGymError, OptionError, StoreError
-from artde_gym.evaluation import evaluate, frontier, tune
+from artde_gym.evaluation import evaluate, frontier, sweep, tune
+from artde_gym.evaluation.evaluate import Update
 from artde_gym.evaluation.report import write_report
 from controllers import GainError
 from tests.mutations import copied, mutate
@@ -46,6 +47,42 @@ def tuned(folder: Path) -> Any:
     )  # fmt: skip
 
 
+SWEEP = """\
+scenario: Q1
+seed: 3
+episodes: 2
+gains: {tde: {k_p_p: 8.0}}
+disturbances:
+  payload: {mass: 0.2, drop: 0.1}
+env_kwargs: {engine: mujoco, duration: 0.1}
+grid:
+  controller: [tde, artde]
+  env_kwargs.control_period: [0.005, 0.015]
+sample:
+  draws: 1
+  vary:
+    disturbances.wind.scale: {uniform: [0.5, 1.0]}
+    gains.artde.alpha_p: {log_uniform: [1, 4]}
+"""
+
+
+def written(folder: Path) -> None:
+    folder.mkdir()
+    (folder / "sweep.yaml").write_text(SWEEP)
+
+
+def swept(folder: Path) -> Any:
+    """The results lie beside the file; a sweep that has become a long one is cut short."""
+    if not folder.exists():
+        written(folder)
+
+    def cut(what: str, update: Update) -> None:
+        if what == "episodes" and update.time_s > 1.0:
+            raise KeyboardInterrupt
+
+    return sweep(folder / "sweep.yaml", folder / "results", on_progress=cut)
+
+
 def reported(folder: Path) -> Any:
     text = write_report(folder).read_text()
     assert "<script>alert" not in text
@@ -56,6 +93,8 @@ READERS: dict[str, tuple[Callable[[Path], Any], Callable[[Path], Any], int]] = {
     "evaluate": (evaluated, evaluated, TRIES),
     "frontier": (searched, searched, TRIES // 4),
     "tune": (tuned, tuned, TRIES // 4),
+    "sweep file": (written, swept, TRIES),
+    "sweep": (swept, swept, TRIES),
     "report": (evaluated, reported, TRIES),
     "report of a frontier": (searched, reported, TRIES),
 }

@@ -124,6 +124,7 @@ def test_a_longer_sweep_extends_its_folder_and_a_shorter_one_is_refused(tmp_path
     ("change", "error", "words"),
     [
         ({"grid": {"controller": ["tde"], "gains.tde.k_q": [1.0]}}, GainError, ["k_q"]),
+        ({"grid": {"controller": ["tde"], "gains.tde.env": [1.0]}}, OptionError, ["gains of 'tde'", "env"]),
         ({"grid": {"controller": ["tde"], "gains.tde.k_p": [1.0, "x"]}}, StoreError, ["gains.k_p", "number and text"]),
         ({"grid": {"env_kwargs.duration": [1.0, -1.0]}}, OptionError, ["duration", "-1"]),
         ({"grid": {"env_kwargs.durration": [1.0]}}, OptionError, ["durration", "duration"]),

@@ -139,6 +139,8 @@ def test_whatever_decides_about_an_episode_decides_about_its_cell(name, value):
         ({"grid": {"disturbances.wind.skale": [1]}}, UnknownNameError, ["skale", "did you mean 'scale'"]),
         ({"grid": {"disturbances.push.magnitude": [1]}}, OptionError, ["at least one 'push'"]),
         ({"grid": {"seed": ["x"]}}, OptionError, ["seed", "'x'"]),
+        ({"grid": {"controller": ["tde", {}]}}, OptionError, ["controller", "a name"]),
+        ({"sample": {"draws": 1, "vary": {"controller": {"choice": [[]]}}}}, OptionError, ["controller", "a name"]),
         ({"grid": {f"env_kwargs.{i}": [1, 2] for i in range(40)}}, OptionError, [str(2**40), "cells"]),
         ({"episodes": 2_000_000, "grid": {"seed": [0, 1]}}, OptionError, ["4000000 episodes"]),
         ({"sample": {"draws": 3}}, OptionError, ["sample", "vary"]),

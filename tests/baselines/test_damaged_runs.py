@@ -110,6 +110,9 @@ def test_a_damaged_run_is_continued_or_refused(tmp_path: Path, monkeypatch: pyte
         assert not marker.exists(), damage
     folder = copied(tmp_path / "whole", tmp_path / "damaged")
     newest = sorted((folder / "checkpoints").iterdir())[-1]
+    (newest / "normaliser.npz").write_bytes(b"PK\x03\x04")  # to be closed again
+    with pytest.raises(TrainingError, match="checkpoint"):
+        train(training, folder)
     torch.save({"policy": Touch(marker)}, newest / "parameters.pt")
     with pytest.raises(TrainingError, match="checkpoint"):
         train(training, folder)
