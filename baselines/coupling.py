@@ -3,20 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from artde_gym.layout import Layout
 from controllers.laws.tracking import Array
-
-
-class Inside(NamedTuple):
-    """What a base controller knows: s (..., n), sigma (..., n) and c (...); zeros where it knows no such thing."""
-
-    s: Array
-    sigma: Array
-    c: Array
 
 
 class Coupling(Protocol):

@@ -45,7 +45,7 @@ class Training:
         env_kwargs: arguments of the environment on top of the task's.
         options: arguments of the algorithm on top of the task's.
         envs: number of environments; None for the task's in a batch, or the number of workers.
-        workers: processes of environments that are no batch.
+        workers: processes of environments that are no batch; of a batch, those of its held-out tests alone.
         test_every: intervals between two held-out tests.
         patience: tests without a better score after which the training ends.
         level: difficulty at the start; None for the task's.
@@ -107,7 +107,7 @@ class Run:
         self.training, self.folder, self.task = training, folder, task(training.env_id)
         self._on_progress = on_progress or (lambda _: None)
         self.state: dict[str, Any] = {"best": None, "stale": 0, "tests": []}
-        _claim(folder, json.loads(json.dumps(dataclasses.asdict(training))))
+        _claim(folder, json.loads(json.dumps(dataclasses.asdict(training))), {"workers"} if self.batched else set())
 
     @property
     def batched(self) -> bool:
@@ -185,8 +185,8 @@ def single(env_id: str, kwargs: dict[str, Any], recipe: Recipe) -> ResidualEnv:
     return ResidualEnv(gym.make(env_id, disable_env_checker=True, **kwargs), recipe)
 
 
-def _claim(folder: Path, configuration: dict[str, Any]) -> None:
-    """Make a folder this run's, or see that it is; its steps and the algorithm's options may change on the way."""
+def _claim(folder: Path, configuration: dict[str, Any], free: set[str]) -> None:
+    """Make a folder this run's, or see that it is; what `free` names may change, as may steps, options and patience."""
     file = folder / "run.json"
     if not file.exists():
         folder.mkdir(parents=True, exist_ok=True)
@@ -195,7 +195,7 @@ def _claim(folder: Path, configuration: dict[str, Any]) -> None:
     with reading("run", file, "a file that `train` wrote", TrainingError):
         before = dict(json.loads(file.read_text(encoding="utf-8"))["configuration"])
     for name, value in configuration.items():
-        if name not in ("steps", "options") and before.get(name) != value:
+        if name not in {"steps", "options", "patience", *free} and before.get(name) != value:
             raise TrainingError(f"{name} of the run in {folder}", value, f"{before.get(name)!r}, or another folder")
 
 
