@@ -2,9 +2,11 @@
 
 from importlib.metadata import version
 
+from artde_gym.deprecation import find_old_modules
 from artde_gym.registration import register_all, register_controller
 
 __version__ = version("artde-gym")
 __all__ = ["__version__", "register_controller"]
 
+find_old_modules()
 register_all()

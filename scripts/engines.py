@@ -16,9 +16,10 @@ import numpy as np
 import pybullet as bullet
 
 import controllers
-from artde_gym.evaluation import SCENARIOS, Result, evaluate, statistics, thesis
+from artde_gym.evaluation import Result, evaluate, statistics, thesis
 from artde_gym.evaluation.evaluate import episode_seed
 from artde_gym.evaluation.rollout import run_episode
+from artde_gym.scenarios import SCENARIOS
 
 ENGINES = ("bullet", "mujoco")
 NAMES = ("tde", "atde", "artde")

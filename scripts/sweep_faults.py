@@ -24,7 +24,7 @@ from typing import Any
 
 import pandas as pd
 
-from artde_gym.evaluation import read_sweep
+from artde_gym.studies import read_sweep
 
 SWEEP = """\
 env_kwargs: {{duration: 1.0, engine: mujoco}}

@@ -27,8 +27,8 @@ from documentation.plant import ARM, modelled, simulate
 from nbclient import NotebookClient
 
 from artde_gym.cli import app
-from artde_gym.evaluation import SCENARIOS
 from artde_gym.evaluation.environments import ours
+from artde_gym.scenarios import SCENARIOS
 from controllers.law_table import LAWS
 from controllers.laws.computed_torque import ComputedTorqueGains
 

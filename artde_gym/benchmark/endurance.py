@@ -14,8 +14,8 @@ from artde_gym.benchmark.environments import ENGINES, biped
 from artde_gym.benchmark.figure import Figure
 from artde_gym.benchmark.timing import resident
 from artde_gym.evaluation.rollout import run_episode
-from artde_gym.evaluation.scenarios import SCENARIOS
 from artde_gym.registration import make_controller
+from artde_gym.scenarios import SCENARIOS
 from artde_gym.sim.bullet import open_clients
 
 GROWTH = 10.0  # MB, at most

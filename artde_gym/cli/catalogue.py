@@ -13,12 +13,12 @@ import numpy as np
 from artde_gym.cli.arguments import ENGINES
 from artde_gym.disturbances import KINDS
 from artde_gym.disturbances.kinds import ALL, allowed
-from artde_gym.evaluation import SCENARIOS
 from artde_gym.evaluation.environments import arguments_of, ours, robot_of
-from artde_gym.evaluation.frontier_standard import STANDARDS
 from artde_gym.registration import registered_controllers
 from artde_gym.robots.ojas import ojas
 from artde_gym.robots.q450 import ROTORS, q450
+from artde_gym.scenarios import SCENARIOS
+from artde_gym.studies.frontier.standard import STANDARDS
 from controllers.presets import LOOPS, PRESETS, named_gains
 from controllers.presets.units import unit_of
 

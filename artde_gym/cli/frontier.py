@@ -27,9 +27,9 @@ from artde_gym.cli.arguments import (
 )
 from artde_gym.cli.display import Display
 from artde_gym.cli.report import show_report
-from artde_gym.evaluation import frontier as run_frontier
-from artde_gym.evaluation.frontier_console import print_frontier
-from artde_gym.evaluation.frontier_standard import STANDARDS
+from artde_gym.studies import frontier as run_frontier
+from artde_gym.studies.frontier.console import print_frontier
+from artde_gym.studies.frontier.standard import STANDARDS
 
 VARIED = dict.fromkeys(path for standard in STANDARDS.values() for path in standard.ranges)
 

@@ -22,7 +22,7 @@ def report(
 
 def show_report(folder: Path, console: Console, *, pictures: bool = False, videos: bool = False) -> None:
     """Write the report of a folder and say where it is."""
-    from artde_gym.evaluation.report import write_report  # only when asked for
+    from artde_gym.report import write_report  # only when asked for
 
     with console.status("Report") as status:
         file = write_report(folder, pictures=pictures, videos=videos, on_progress=status.update)

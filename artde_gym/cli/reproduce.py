@@ -12,10 +12,10 @@ from rich.console import Console
 from artde_gym.cli.arguments import ENGINES, Pictures, Report, Seed, Videos, Workers, names, processes
 from artde_gym.cli.display import Display
 from artde_gym.cli.report import show_report
-from artde_gym.evaluation import reproduce as run_reproduction
-from artde_gym.evaluation.claims import confirm
 from artde_gym.evaluation.console import print_claims, print_result
-from artde_gym.evaluation.reproduce import ROBOTS, scenarios_of
+from artde_gym.studies import reproduce as run_reproduction
+from artde_gym.studies.reproduce.claims import confirm
+from artde_gym.studies.reproduce.reproduction import ROBOTS, scenarios_of
 
 
 def reproduce(

@@ -10,8 +10,8 @@ from rich.console import Console
 
 from artde_gym.cli.arguments import Workers, processes
 from artde_gym.cli.display import Display
-from artde_gym.evaluation import sweep as run_sweep
-from artde_gym.evaluation.sweep_console import print_sweep
+from artde_gym.studies import sweep as run_sweep
+from artde_gym.studies.sweep.console import print_sweep
 
 
 def sweep(

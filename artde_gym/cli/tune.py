@@ -24,8 +24,8 @@ from artde_gym.cli.arguments import (
     processes,
 )
 from artde_gym.cli.display import Display
-from artde_gym.evaluation import tune as run_tuning
-from artde_gym.evaluation.tune_console import print_tuning
+from artde_gym.studies import tune as run_tuning
+from artde_gym.studies.tune.console import print_tuning
 
 
 def tune(

@@ -44,7 +44,7 @@ def video(
     gains: Gains = None,
 ) -> None:
     """Show one or several controllers, side by side, in an episode of `evaluate`."""
-    from artde_gym.evaluation.film import video as make_video  # only when asked for
+    from artde_gym.video import video as make_video  # only when asked for
 
     console = Console()
     columns_shown = (TextColumn("{task.description}"), TimeElapsedColumn())

@@ -8,6 +8,7 @@ from typing import Any
 
 from artde_gym.arguments import number
 from artde_gym.errors import OptionError
+from artde_gym.scenarios import scenario
 
 
 def steps_per_period(control_period: float, step: float) -> int:
@@ -38,8 +39,6 @@ def disturbances_in(options: Mapping[str, Any], env: Any) -> Mapping[str, Any] |
             raise OptionError("reset option", key, "'disturbances', 'scenario'")
     disturbances = None
     if options.get("scenario") is not None:
-        from artde_gym.evaluation.scenarios import scenario  # scenarios name environments, so not at the top
-
         entry = scenario(options["scenario"])
         for name, value in entry.kwargs.items():
             if getattr(env, name, None) != value:

@@ -1,27 +1,15 @@
-"""Judging policies: seeded episodes, metrics, statistics and results folders."""
+"""The harness that judges policies: seeded episodes, metrics, statistics and results folders."""
 
+from artde_gym.deprecation import moved
 from artde_gym.evaluation.evaluate import evaluate
-from artde_gym.evaluation.frontier import Frontier, frontier
-from artde_gym.evaluation.reproduce import Reproduction, reproduce
 from artde_gym.evaluation.result import Result
-from artde_gym.evaluation.scenarios import SCENARIOS, Scenario, scenario
-from artde_gym.evaluation.sweep import Sweep, sweep
-from artde_gym.evaluation.sweep_store import read_sweep
-from artde_gym.evaluation.tune import Tuning, tune
 
-__all__ = [
-    "SCENARIOS",
-    "Frontier",
-    "Reproduction",
-    "Result",
-    "Scenario",
-    "Sweep",
-    "Tuning",
-    "evaluate",
-    "frontier",
-    "read_sweep",
-    "reproduce",
-    "scenario",
-    "sweep",
-    "tune",
-]
+__all__ = ["Result", "evaluate"]
+
+_STUDIES = ("Frontier", "Reproduction", "Sweep", "Tuning", "frontier", "read_sweep", "reproduce", "sweep", "tune")
+_SCENARIOS = ("SCENARIOS", "Scenario", "scenario")
+
+__getattr__ = moved(
+    __name__,
+    {**dict.fromkeys(_STUDIES, "artde_gym.studies"), **dict.fromkeys(_SCENARIOS, "artde_gym.scenarios")},
+)

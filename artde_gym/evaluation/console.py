@@ -17,7 +17,7 @@ from artde_gym.arrays import Array
 from artde_gym.evaluation import statistics, thesis
 from artde_gym.evaluation.environments import tracking_of
 from artde_gym.evaluation.result import Result
-from artde_gym.evaluation.scenarios import SCENARIOS
+from artde_gym.scenarios import SCENARIOS
 from artde_gym.tracking import Tracking
 
 UNITS = {"deg": ("deg", 3), "m": ("m", 4), "nm": ("Nm", 3), "n": ("N", 3)}
@@ -47,7 +47,7 @@ def print_result(result: Result, console: Console) -> None:
 
 
 def print_claims(verdicts: pd.DataFrame, console: Console) -> None:
-    """Print the table of `artde_gym.evaluation.claims.judge`, or of `confirm`."""
+    """Print the table of `artde_gym.studies.reproduce.claims.judge`, or of `confirm`."""
     table = _table(*verdicts.columns, title="Claims")
     for row in verdicts.itertuples(index=False, name=None):
         table.add_row(*(Text(word, style=_VERDICTS.get(word, "")) for word in row))

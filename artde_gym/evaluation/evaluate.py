@@ -20,11 +20,11 @@ from artde_gym.evaluation.environments import Backend, single, tracking_of, vect
 from artde_gym.evaluation.metrics import Span
 from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.rollout import Episode, Policy, run_episode
-from artde_gym.evaluation.scenarios import Scenario
-from artde_gym.evaluation.scenarios import scenario as find_scenario
 from artde_gym.evaluation.store import Store
 from artde_gym.evaluation.workers import run_here, run_parallel
 from artde_gym.registration import ControllerSpec, make_controller, register_spec, registered_controllers
+from artde_gym.scenarios import Scenario
+from artde_gym.scenarios import scenario as find_scenario
 
 DEFAULT_ENVIRONMENT = "BipedWalk-Payload-v0"
 CUSTOM = "custom"
@@ -90,7 +90,7 @@ def evaluate(
         controllers: registered names, or policies with Stable-Baselines3's `predict` (listed under their `name`, else
             their class); as a mapping, under its keys.
         env_id: any registered environment of this project. Scenarios bring their own; with one, it must be theirs.
-        scenario: one or several names of `artde_gym.evaluation.scenarios`; None for the environment as it is.
+        scenario: one or several names of `artde_gym.scenarios`; None for the environment as it is.
         episodes: of each controller in each scenario.
         seed: of the whole evaluation; episode i has the same seed for every controller and scenario.
         workers: processes; the results do not depend on it.

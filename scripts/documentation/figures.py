@@ -12,10 +12,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from artde_gym.arrays import Array
-from artde_gym.evaluation.palette import looks
-from artde_gym.evaluation.report.chart import Axis, Chart
-from artde_gym.evaluation.report.diagram import cascade, joint_loop
-from artde_gym.evaluation.report.html import figure
+from artde_gym.palette import looks
+from artde_gym.report.chart import Axis, Chart
+from artde_gym.report.diagram import cascade, joint_loop
+from artde_gym.report.html import figure
 from controllers.law_table import LAWS
 from controllers.laws.attitude import attitude_error
 from controllers.laws.computed_torque import ComputedTorqueGains

@@ -12,9 +12,9 @@ import gymnasium as gym
 from gymnasium.envs.registration import load_env_creator
 
 import artde_gym  # noqa: F401  # registers the environments
-from artde_gym.evaluation import SCENARIOS
 from artde_gym.evaluation.environments import ours, robot_of
 from artde_gym.registration import registered_controllers
+from artde_gym.scenarios import SCENARIOS
 from controllers.presets import PRESETS
 
 ROOT = Path(__file__).parents[2]

@@ -9,9 +9,10 @@ import pandas as pd
 import pytest
 from rich.console import Console
 
-from artde_gym.evaluation import SCENARIOS, Result, statistics, thesis
-from artde_gym.evaluation.claims import CLAIMS, adapts, confirm, falls, improves, judge, ordered, repeats
+from artde_gym.evaluation import Result, statistics, thesis
 from artde_gym.evaluation.console import print_claims
+from artde_gym.scenarios import SCENARIOS
+from artde_gym.studies.reproduce.claims import CLAIMS, adapts, confirm, falls, improves, judge, ordered, repeats
 
 
 def episodes(errors: dict[str, float], fell: dict[str, int] | None = None, n: int = 20, scenario: str = "S") -> Result:

@@ -15,9 +15,10 @@ import numpy as np
 import pytest
 
 from artde_gym.errors import ArtdeGymError, OptionError, StoreError
-from artde_gym.evaluation import evaluate, frontier, sweep, tune
+from artde_gym.evaluation import evaluate
 from artde_gym.evaluation.evaluate import Update
-from artde_gym.evaluation.report import write_report
+from artde_gym.report import write_report
+from artde_gym.studies import frontier, sweep, tune
 from controllers import GainError
 from tests.mutations import copied, mutate
 

@@ -20,13 +20,15 @@ from typer.testing import CliRunner
 from artde_gym.cli import app
 from artde_gym.disturbances import KINDS, Disturbances
 from artde_gym.errors import ArtdeGymError, DisturbanceError, OptionError, StoreError, UnknownNameError
-from artde_gym.evaluation import Frontier, frontier, statistics
+from artde_gym.evaluation import statistics
 from artde_gym.evaluation.evaluate import Update
-from artde_gym.evaluation.frontier import LEVEL_COLUMNS, TABLE_COLUMNS, _frontier, search, value_text
-from artde_gym.evaluation.frontier_axis import Axis, axis
-from artde_gym.evaluation.frontier_figure import draw
-from artde_gym.evaluation.frontier_standard import STANDARDS, standard_test
-from artde_gym.evaluation.palette import LOOKS, OTHERS, looks
+from artde_gym.palette import LOOKS, OTHERS, looks
+from artde_gym.studies import Frontier, frontier
+from artde_gym.studies.frontier.axis import Axis, axis
+from artde_gym.studies.frontier.figure import draw
+from artde_gym.studies.frontier.result import value_text
+from artde_gym.studies.frontier.search import LEVEL_COLUMNS, TABLE_COLUMNS, _frontier, search
+from artde_gym.studies.frontier.standard import STANDARDS, standard_test
 
 PUSH = "BipedPush-v0"
 QUADROTOR = "QuadInfinity-Payload-v0"

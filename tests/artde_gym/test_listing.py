@@ -13,8 +13,8 @@ import controllers
 from artde_gym.cli import app
 from artde_gym.cli.catalogue import TOPICS
 from artde_gym.disturbances import KINDS
-from artde_gym.evaluation import SCENARIOS
 from artde_gym.registration import registered_controllers
+from artde_gym.scenarios import SCENARIOS
 from controllers.presets import named_gains
 
 

@@ -20,8 +20,9 @@ import artde_gym
 from artde_gym import registration
 from artde_gym.cli import app
 from artde_gym.errors import ActionError, ArtdeGymError, DisturbanceError, OptionError, StoreError, WorkerError
-from artde_gym.evaluation import evaluate, read_sweep, sweep
+from artde_gym.evaluation import evaluate
 from artde_gym.evaluation.workers import run_parallel
+from artde_gym.studies import read_sweep, sweep
 from controllers import GainError
 
 pytest.importorskip("pyarrow", reason="pyarrow is not installed (extra sweep)")

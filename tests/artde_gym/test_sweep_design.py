@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from artde_gym.errors import ArtdeGymError, OptionError, UnknownNameError
-from artde_gym.evaluation import SCENARIOS
-from artde_gym.evaluation.sweep_design import SETTINGS, design, read
+from artde_gym.scenarios import SCENARIOS
+from artde_gym.studies.sweep.design import SETTINGS, design, read
 
 pytest.importorskip("yaml", reason="pyyaml is not installed (extra sweep)")
 

@@ -16,8 +16,10 @@ import pandas as pd
 import pytest
 
 from artde_gym.errors import StoreError
-from artde_gym.evaluation import read_sweep, sweep_part, sweep_store
-from artde_gym.evaluation.sweep_store import SweepStore
+from artde_gym.studies import read_sweep
+from artde_gym.studies.sweep import parquet as sweep_part
+from artde_gym.studies.sweep import store as sweep_store
+from artde_gym.studies.sweep.store import SweepStore
 
 pytest.importorskip("pyarrow", reason="pyarrow is not installed (extra sweep)")
 
@@ -274,7 +276,7 @@ def test_two_processes_do_not_write_one_folder(tmp_path, whole):
         "import sys\n"
         "from pathlib import Path\n"
         "from artde_gym.errors import StoreError\n"
-        "from artde_gym.evaluation.sweep_store import SweepStore\n"
+        "from artde_gym.studies.sweep.store import SweepStore\n"
         "try:\n"
         "    SweepStore(Path(sys.argv[1]))\n"
         "except StoreError as error:\n"

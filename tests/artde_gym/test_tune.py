@@ -17,8 +17,9 @@ import artde_gym
 from artde_gym import registration
 from artde_gym.cli import app
 from artde_gym.errors import ArtdeGymError, DisturbanceError, OptionError, StoreError, UnknownNameError
-from artde_gym.evaluation import Tuning, evaluate, tune
+from artde_gym.evaluation import evaluate
 from artde_gym.registration import GainRange, registered_controllers, search_space
+from artde_gym.studies import Tuning, tune
 
 QUADROTOR = "QuadInfinity-Payload-v0"
 BIPED = "BipedWalk-Payload-v0"

@@ -20,12 +20,12 @@ import controllers
 from artde_gym.cli import app
 from artde_gym.errors import OptionError, UnknownNameError
 from artde_gym.evaluation import evaluate
-from artde_gym.evaluation.film import video
-from artde_gym.evaluation.film.panels import FALLEN, panels
-from artde_gym.evaluation.film.shots import Shot, shots
-from artde_gym.evaluation.film.writer import frame_rate
-from artde_gym.evaluation.palette import LOOKS
+from artde_gym.palette import LOOKS
 from artde_gym.registration import registered_controllers
+from artde_gym.video import video
+from artde_gym.video.frames import Shot, shots
+from artde_gym.video.tiles import FALLEN, panels
+from artde_gym.video.writer import frame_rate
 
 WALK = "BipedWalk-Payload-v0"
 SHOVE = {"body": "chest", "magnitude": 80.0, "direction": [1.0, 0.0, 0.0], "start": 0.2, "duration": 0.2}

@@ -20,7 +20,7 @@ from stable_baselines3.common.vec_env import VecMonitor
 
 import artde_gym  # noqa: F401  # registers the environments
 from artde_gym.errors import OptionError
-from artde_gym.evaluation.report import write_report
+from artde_gym.report import write_report
 from baselines.errors import TrainingError
 from baselines.export import exported
 from baselines.recipe import Recipe

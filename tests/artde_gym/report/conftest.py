@@ -6,9 +6,10 @@ import json
 
 import pytest
 
-from artde_gym.evaluation import evaluate, frontier
-from artde_gym.evaluation.claims import CLAIMS, judge
-from artde_gym.evaluation.report import write_report
+from artde_gym.evaluation import evaluate
+from artde_gym.report import write_report
+from artde_gym.studies import frontier
+from artde_gym.studies.reproduce.claims import CLAIMS, judge
 
 SHORT = {"duration": 3.0, "actuator_inertia": "lumped"}
 

@@ -20,13 +20,13 @@ from typer.testing import CliRunner
 from artde_gym.cli import app
 from artde_gym.envs.view import PUSH
 from artde_gym.errors import StoreError
-from artde_gym.evaluation.palette import Look
-from artde_gym.evaluation.report import write_report
-from artde_gym.evaluation.report.answer import headline, ranking, sentences
-from artde_gym.evaluation.report.chart import Axis, Chart
-from artde_gym.evaluation.report.laws import Laws
-from artde_gym.evaluation.report.run import Run, nested
 from artde_gym.evaluation.result import Result
+from artde_gym.palette import Look
+from artde_gym.report import write_report
+from artde_gym.report.answer import headline, ranking, sentences
+from artde_gym.report.chart import Axis, Chart
+from artde_gym.report.laws import Laws
+from artde_gym.report.run import Run, nested
 
 
 class Reader(html.parser.HTMLParser):

@@ -1,0 +1,103 @@
+"""Figures of the walk: what the feet and the joints are meant to do, what the ground gives back, the tilt."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from artde_gym.arrays import Array
+from artde_gym.palette import OTHERS, Look, looks
+from artde_gym.references.walking import walking_pattern
+from artde_gym.report.chart import Axis, Chart
+from artde_gym.report.html import figure, paragraph
+from artde_gym.report.run import Episode, Signals
+from artde_gym.report.signals import add, over_time
+from artde_gym.robots.dynamics import RigidBodyTree
+from artde_gym.robots.ojas import ojas
+
+SHOWN = 10.0  # s of the walk, from its start
+SIDES: dict[str, Look] = {"left": OTHERS[3], "right": OTHERS[4]}
+BODY = {"centre of mass": OTHERS[2], **{f"{side} foot": look for side, look in SIDES.items()}}
+PERIOD = 0.001  # s, of the pattern in the environment
+
+
+def figures(episode: Episode) -> list[str]:
+    """The ground's force and the tilt of one episode."""
+    return [_ground(episode), _tilt(episode)]
+
+
+def pattern_of(kwargs: Mapping[str, Any]) -> dict[str, Any]:
+    """The arguments of the walking pattern among those of an environment."""
+    known = inspect.signature(walking_pattern).parameters
+    return {name: value for name, value in kwargs.items() if name in known}
+
+
+def reference(arguments: Mapping[str, Any]) -> list[str]:
+    """What the pattern wants of the centre of mass, the feet and the joints."""
+    pattern = walking_pattern(**arguments, period=PERIOD)
+    part = slice(0, round(SHOWN / PERIOD), 10)
+    time = PERIOD * np.arange(len(pattern.q))[part]
+    com = pattern.base[part] + RigidBodyTree(ojas("none")).center_of_mass(pattern.q[part])
+    paths = {"centre of mass": com, "left foot": pattern.feet[part, 0], "right foot": pattern.feet[part, 1]}
+    trajectories = {}
+    for i, axis in enumerate("xyz"):
+        chart = _chart(
+            f"Desired {axis} of centre of mass and feet", f"{axis} (m)", time, [p[:, i] for p in paths.values()]
+        )
+        for name, path in paths.items():
+            chart.line(time, path[:, i], BODY[name], text=name)
+        trajectories[axis] = chart.svg()
+    joints = {}
+    for i in range(6):
+        columns = {side: np.degrees(pattern.q[part, i + 6 * j]) for j, side in enumerate(SIDES)}
+        chart = _chart(f"Desired trajectory of q{i + 1}", "angle (deg)", time, list(columns.values()))
+        for side, column in columns.items():
+            chart.line(time, column, SIDES[side], text=side)
+        joints[f"q{i + 1}"] = chart.svg()
+    first = f"the first {min(SHOWN, float(time[-1])):.0f} s"
+    return [
+        figure(f"Desired trajectories of the centre of mass and the ankles, {first}.", trajectories, BODY),
+        figure(f"Desired joint trajectories of both legs, {first}.", joints, SIDES),
+    ]
+
+
+def _ground(episode: Episode) -> str:
+    """Vertical force of the ground on each foot, one chart a controller."""
+    charts = {}
+    for name, signals in episode.signals.items():
+        loads = _loads(signals)
+        if loads is None:
+            continue
+        time = signals.time[: len(loads)]
+        chosen = time <= SHOWN
+        chart = _chart(f"Ground reaction force under {name}", "force (N)", time[chosen], [loads[chosen]])
+        for i, side in enumerate(SIDES):
+            chart.line(time[chosen], loads[chosen, i], SIDES[side], text=side)
+        charts[name] = chart.svg()
+    if not charts:
+        return paragraph("Ground reaction forces are not among the stored signals of this run.", "soft")
+    return figure(f"Ground reaction force on each leg, vertical, the first {SHOWN:.0f} s.", charts, SIDES)
+
+
+def _loads(signals: Signals) -> Array | None:
+    if "foot_loads" in signals.fields:
+        return signals.fields["foot_loads"]
+    if "ground_force" in signals.fields:
+        return signals.fields["ground_force"][:, [2, 5]]
+    return None
+
+
+def _tilt(episode: Episode) -> str:
+    """How far the torso leans: what a fall begins with."""
+    tilts = {name: np.degrees(np.linalg.norm(s.fields["tilt"], axis=-1)) for name, s in episode.signals.items()}
+    chart = over_time(episode, "Tilt of the torso", "tilt (deg)", list(tilts.values()), zero=True)
+    for name, tilt in tilts.items():
+        add(chart, episode.signals[name], tilt, name)
+    return figure(f"Tilt of the torso, episode {episode.number}.", {"": chart.svg()}, looks(episode.signals))
+
+
+def _chart(name: str, label: str, time: Array, columns: list[Array]) -> Chart:
+    return Chart(f"{name} over time", Axis("time (s)", 0.0, float(time[-1])), Axis.of(label, *columns))

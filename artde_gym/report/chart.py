@@ -1,0 +1,259 @@
+"""Small charts as SVG text that takes its ink from the page, so that one file serves light, dark and paper.
+
+A chart is drawn at a fixed size in its own units and scales with the page. Lines are thinned to the smallest and the
+largest value in each of `COLUMNS` columns: no peak is lost, and a minute of signals weighs a few kilobytes.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from artde_gym.arrays import Array
+from artde_gym.palette import Look
+
+COLUMNS = 220
+LEFT, RIGHT, TOP, BOTTOM = 64, 12, 12, 40  # margins of the drawing, in its own units
+TICKS = 5
+
+SHAPES: dict[str, str] = {
+    "o": "M-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0z",
+    "s": "M-3.6 -3.6h7.2v7.2h-7.2z",
+    "D": "M0 -5L5 0L0 5L-5 0z",
+    "P": "M-1.5 -4.5h3v3h3v3h-3v3h-3v-3h-3v-3h3z",
+    "^": "M0 -4.6L4.6 3.6H-4.6z",
+    "v": "M0 4.6L4.6 -3.6H-4.6z",
+    "<": "M-4.6 0L3.6 -4.6V4.6z",
+    ">": "M4.6 0L-3.6 -4.6V4.6z",
+    "X": "M-4.4 -2.2L-2.2 -4.4L0 -2.2L2.2 -4.4L4.4 -2.2L2.2 0L4.4 2.2L2.2 4.4L0 2.2L-2.2 4.4L-4.4 2.2L-2.2 0z",
+    "*": "M0 -5.4L1.4 -1.6H5.2L2.2 .7L3.3 4.4L0 2.2L-3.3 4.4L-2.2 .7L-5.2 -1.6H-1.4z",
+}
+"""Outline of a marker around the origin, by Matplotlib's letter; any other letter is a circle."""
+
+
+class Axis(NamedTuple):
+    """What an axis shows: its label with the unit, and its range; in decades where `log` is true."""
+
+    label: str
+    low: float
+    high: float
+    log: bool = False
+
+    @classmethod
+    def of(cls, label: str, *values: ArrayLike, log: bool = False, zero: bool = False) -> Axis:
+        """An axis over all finite values with a little room; from zero on where `zero` is true."""
+        flat = np.concatenate([np.asarray(value, dtype=np.float64).ravel() for value in values] or [np.zeros(0)])
+        flat = flat[np.isfinite(flat) & (flat > 0 if log else True)]
+        low, high = (float(flat.min()), float(flat.max())) if len(flat) else (0.1, 1.0)
+        if log:
+            low, high = 10 ** math.floor(math.log10(low) + 1e-9), 10 ** math.ceil(math.log10(high) - 1e-9)
+            return cls(label, low, high if high > low else 10 * low, log=True)
+        low = min(low, 0.0) if zero else low
+        room = 0.05 * (high - low) or 0.05 * abs(high) or 1.0
+        return cls(label, low if zero and low == 0 else low - room, high + room)
+
+    def place(self, values: ArrayLike) -> Array:
+        """Values as shares of the axis, 0 to 1; NaN for what a logarithmic axis cannot show."""
+        array = np.asarray(values, dtype=np.float64)
+        if not self.log:
+            return (array - self.low) / (self.high - self.low)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = np.log(array / self.low) / math.log(self.high / self.low)
+        return np.where(array > 0, np.maximum(share, 0.0), np.nan)
+
+    def ticks(self) -> list[float]:
+        """Round values within the range, about `TICKS` of them."""
+        if self.log:
+            first, last = round(math.log10(self.low)), round(math.log10(self.high))
+            if last - first < TICKS / 2:
+                steps = (factor * 10.0**power for power in range(first, last + 1) for factor in (1, 2, 5))
+                return [step for step in steps if step <= self.high]
+            stride = max(1, math.ceil((last - first) / TICKS))
+            return [10.0**power for power in range(first, last + 1, stride)]
+        rough = (self.high - self.low) / TICKS
+        size = 10 ** math.floor(math.log10(rough))
+        step = next(size * factor for factor in (1, 2, 5, 10) if size * factor >= rough)
+        first, last = math.ceil(self.low / step - 1e-9), math.floor(self.high / step + 1e-9)
+        return [i * step for i in range(first, last + 1)]
+
+
+class Chart:
+    """One drawing with two axes.
+
+    Args:
+        name: what it shows, for those who do not see it; the page's caption says more.
+        x, y: axes.
+        width, height: in its own units; a unit is about a pixel.
+        names: positions on the x axis that have a name in place of a number.
+        frame: whether axes are drawn.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        x: Axis,
+        y: Axis,
+        width: int = 400,
+        height: int = 250,
+        names: Mapping[str, float] | None = None,
+        *,
+        frame: bool = True,
+    ) -> None:
+        self.x, self.y, self._name = x, y, name
+        self.width, self.height = width, height
+        self._parts = [self._frame(names)] if frame else []
+
+    def line(self, x: ArrayLike, y: ArrayLike, look: Look, *, text: str = "", kind: str = "line") -> None:
+        """Connect points, thinned; gaps where a value is not finite."""
+        across, up = self._points(x, y)
+        if len(across) > 2 * COLUMNS and kind != "path":
+            across, up = _thinned(across, up)
+        self._parts.append(
+            f'<path class="{kind}" style="--c:{look.colour}" d="{_path(across, up)}">{_title(text)}</path>'
+        )
+
+    def reference(self, x: ArrayLike, y: ArrayLike, text: str = "reference") -> None:
+        """A dashed line in the page's own ink: what is meant to be followed."""
+        across, up = self._points(x, y)
+        self._parts.append(f'<path class="reference" d="{_path(*_thinned(across, up))}">{_title(text)}</path>')
+
+    def marker(self, x: float, y: float, look: Look, text: str = "") -> None:
+        (across,), (up,) = self._points([x], [y])
+        if math.isfinite(across + up):
+            shape = SHAPES.get(look.marker, SHAPES["o"])
+            place = f"translate({across:.1f} {up:.1f})"
+            self._parts.append(
+                f'<path class="marker" style="--c:{look.colour}" transform="{place}" d="{shape}">{_title(text)}</path>'
+            )
+
+    def interval(self, x: float, low: float, high: float, look: Look) -> None:
+        """A vertical bar, from low to high."""
+        (across, _), ups = self._points([x, x], [low, high])
+        if np.isfinite(ups).all():
+            self._parts.append(
+                f'<path class="interval" style="--c:{look.colour}" d="M{across:.1f} {ups[0]:.1f}V{ups[1]:.1f}"/>'
+            )
+
+    def dash(self, x: float, y: float, text: str) -> None:
+        """A short horizontal mark: a value that somebody else reports."""
+        (across,), (up,) = self._points([x], [y])
+        if math.isfinite(up):
+            self._parts.append(f'<path class="dash" d="M{across - 7:.1f} {up:.1f}h14">{_title(text)}</path>')
+
+    def cross(self, x: float, y: float, look: Look, text: str) -> None:
+        """A cross: here it fell."""
+        (across,), (up,) = self._points([x], [y])
+        if math.isfinite(across + up):
+            place = f"translate({across:.1f} {up:.1f})"
+            self._parts.append(
+                f'<path class="cross" style="--c:{look.colour}" transform="{place}" d="M-5 -5L5 5M-5 5L5 -5">'
+                f"{_title(text)}</path>"
+            )
+
+    def event(self, begin: float, end: float, text: str) -> None:
+        """A vertical mark from `begin` to `end`, named at the top."""
+        if not self.x.low <= begin <= self.x.high:
+            return
+        (first, last), _ = self._points([begin, min(end, self.x.high)], [self.y.low] * 2)
+        size = self.height - TOP - BOTTOM
+        late = first > 0.8 * self.width  # no room for words on its right
+        place = f'x="{first - 4:.1f}" text-anchor="end"' if late else f'x="{first + 4:.1f}"'
+        self._parts.append(
+            f'<g class="event"><rect x="{first:.1f}" y="{TOP}" width="{max(last - first, 1.5):.1f}" height="{size}"/>'
+            f'<text {place} y="{TOP + 10}">{escape(text)}</text></g>'
+        )
+
+    def level(self, y: float, text: str, look: Look | None = None) -> None:
+        """A horizontal line with its meaning at the right end."""
+        (_,), (up,) = self._points([self.x.low], [y])
+        if TOP <= up <= self.height - BOTTOM:
+            style = f' style="--c:{look.colour}"' if look else ""
+            self._parts.append(
+                f'<g class="level"{style}><path d="M{LEFT} {up:.1f}H{self.width - RIGHT}"/>'
+                f'<text x="{self.width - RIGHT - 2}" y="{up - 4:.1f}" text-anchor="end">{escape(text)}</text></g>'
+            )
+
+    def guide(self, x: ArrayLike, y: ArrayLike) -> None:
+        """A thin line of no weight of its own, as a grid has them."""
+        self._parts.append(f'<path class="grid" d="{_path(*self._points(x, y))}"/>')
+
+    def text(self, x: float, y: float, text: str) -> None:
+        (across,), (up,) = self._points([x], [y])
+        self._parts.append(f'<text x="{across:.1f}" y="{up:.1f}" text-anchor="middle">{escape(text)}</text>')
+
+    def svg(self) -> str:
+        name = escape(self._name, quote=True)
+        return (
+            f'<svg role="img" aria-label="{name}" viewBox="0 0 {self.width} {self.height}"><title>{name}</title>'
+            f"{''.join(self._parts)}</svg>"
+        )
+
+    def _points(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+        across = LEFT + self.x.place(x) * (self.width - LEFT - RIGHT)
+        up = self.height - BOTTOM - self.y.place(y) * (self.height - TOP - BOTTOM)
+        return across, up
+
+    def _frame(self, names: Mapping[str, float] | None) -> str:
+        floor, right = self.height - BOTTOM, self.width - RIGHT
+        parts = []
+        for text, value in [(_number(tick), tick) for tick in self.y.ticks()]:
+            (_,), (up,) = self._points([self.x.low], [value])
+            parts.append(f'<path class="grid" d="M{LEFT} {up:.1f}H{right}"/>')
+            parts.append(f'<text x="{LEFT - 6}" y="{up + 4:.1f}" text-anchor="end">{text}</text>')
+        for text, value in [(_number(tick), tick) for tick in self.x.ticks()] if names is None else names.items():
+            (across,), (_,) = self._points([value], [self.y.low])
+            parts.append(f'<path class="axis" d="M{across:.1f} {floor}v4"/>')
+            parts.append(f'<text x="{across:.1f}" y="{floor + 17}" text-anchor="middle">{escape(text)}</text>')
+        parts.append(f'<path class="axis" d="M{LEFT} {TOP}V{floor}H{right}"/>')
+        middle = (TOP + floor) / 2
+        parts.append(
+            f'<text class="label" x="{(LEFT + right) / 2}" y="{self.height - 5}" text-anchor="middle">'
+            f"{escape(self.x.label)}</text>"
+            f'<text class="label" transform="translate(13 {middle}) rotate(-90)" text-anchor="middle">'
+            f"{escape(self.y.label)}</text>"
+        )
+        return "".join(parts)
+
+
+def height_of(x: Axis, y: Axis, width: int) -> int:
+    """The height of a chart of this width in which a unit is as long on both axes."""
+    return round((width - LEFT - RIGHT) * (y.high - y.low) / (x.high - x.low)) + TOP + BOTTOM
+
+
+def _thinned(x: Array, y: Array) -> tuple[Array, Array]:
+    """The smallest and the largest `y` of each column, in their order, and both ends."""
+    if len(x) <= 2 * COLUMNS:
+        return x, y
+    edges = np.linspace(0, len(x), COLUMNS + 1).astype(int)
+    kept = [0, len(x) - 1]
+    for first, last in itertools.pairwise(edges.tolist()):
+        part = y[first:last]
+        if np.isfinite(part).any():
+            kept += [first + int(np.nanargmin(part)), first + int(np.nanargmax(part))]
+    order = sorted(set(kept))
+    return x[order], y[order]
+
+
+def _path(x: Sequence[float] | Array, y: Sequence[float] | Array) -> str:
+    parts, pen = [], "M"
+    for across, up in zip(x, y, strict=True):
+        if math.isfinite(across + up):
+            parts.append(f"{pen}{across:.1f} {up:.1f}")
+            pen = "L"
+        else:
+            pen = "M"
+    return "".join(parts)
+
+
+def _title(text: str) -> str:
+    return f"<title>{escape(text)}</title>" if text else ""
+
+
+def _number(value: float) -> str:
+    return f"{0.0 if abs(value) < 1e-12 else value:.6g}"

@@ -1,0 +1,90 @@
+"""Figures of the flight: the path in space and in two planes, flown and meant."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from artde_gym.arrays import Array
+from artde_gym.palette import looks
+from artde_gym.report.chart import Axis, Chart, height_of
+from artde_gym.report.html import figure
+from artde_gym.report.run import Episode
+
+PLANES = {"XZ": (0, 2), "YZ": (1, 2), "XY": (0, 1)}
+WIDTH = 400
+AZIMUTH, ELEVATION = math.radians(-60.0), math.radians(28.0)  # of the eye, as seen from the middle
+GRID = 0.5  # m, of the floor
+STRIDE = 4  # of stored samples: a path needs fewer than a signal
+
+
+def figures(episode: Episode) -> list[str]:
+    """The infinity path in three dimensions and its projections."""
+    shown = looks(episode.signals)
+    paths = {name: signals.fields["position"][::STRIDE] for name, signals in episode.signals.items()}
+    longest = max(episode.signals.values(), key=lambda signals: len(signals.time))
+    wanted = longest.fields["position_ref"][::STRIDE]
+    charts = {"3D": _space(paths, wanted)}
+    for plane, (i, j) in PLANES.items():
+        everything = np.concatenate([wanted, *paths.values()])
+        x, y = (Axis.of(f"{'xyz'[k]} (m)", everything[:, k]) for k in (i, j))
+        height = height_of(x, y, WIDTH)
+        chart = Chart(f"Flown and desired path in the {plane} plane", x, y, WIDTH, height)
+        for name, path in paths.items():
+            chart.line(path[:, i], path[:, j], shown[name], text=name, kind="path")
+        chart.reference(wanted[:, i], wanted[:, j])
+        charts[f"{plane} plane"] = chart.svg()
+    caption = f"The infinity path, episode {episode.number} (seed {episode.seed}); dashed: the reference. Equal scales."
+    return [figure(caption, charts, shown)]
+
+
+def _space(paths: dict[str, Array], wanted: Array) -> str:
+    everything = np.concatenate([wanted, *paths.values()])
+    low, high = np.floor(everything.min(0) / GRID) * GRID, np.ceil(everything.max(0) / GRID) * GRID
+    low[2] = 0.0
+    corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (0.0, high[2])])
+    seen = _seen(np.concatenate([corners, everything]))
+    x, y = Axis.of("", seen[:, 0]), Axis.of("", seen[:, 1])
+    height = height_of(x, y, WIDTH)
+    chart = Chart("Flown and desired path in three dimensions, with its shadow", x, y, WIDTH, height, frame=False)
+
+    def segment(start: list[float], end: list[float]) -> None:
+        x, y = _seen(np.array([start, end])).T
+        chart.guide(x, y)
+
+    def label(point: list[float], text: str) -> None:
+        ((x, y),) = _seen(np.array([point]))
+        chart.text(x, y, text)
+
+    for value in np.arange(low[0], high[0] + GRID / 2, GRID):
+        segment([value, low[1], 0], [value, high[1], 0])
+        label([value, low[1] - 0.18, 0], f"{value:g}")
+    for value in np.arange(low[1], high[1] + GRID / 2, GRID):
+        segment([low[0], value, 0], [high[0], value, 0])
+        label([high[0] + 0.18, value, 0], f"{value:g}")
+    for value in np.arange(GRID, high[2] + GRID / 2, GRID):
+        segment([low[0], low[1], value], [low[0] + 0.06, low[1], value])
+        label([low[0] - 0.16, low[1], value], f"{value:g}")
+    segment([low[0], low[1], 0], [low[0], low[1], high[2]])
+    label([(low[0] + high[0]) / 2, low[1] - 0.5, 0], "x (m)")
+    label([high[0] + 0.5, (low[1] + high[1]) / 2, 0], "y (m)")
+    label([low[0] - 0.16, low[1], high[2] + 0.2], "z (m)")
+    shadow = wanted * [1.0, 1.0, 0.0]
+    across, up = _seen(shadow).T
+    chart.guide(across, up)
+    shown = looks(paths)
+    for name, path in paths.items():
+        across, up = _seen(path).T
+        chart.line(across, up, shown[name], text=name, kind="path")
+    across, up = _seen(wanted).T
+    chart.reference(across, up)
+    return chart.svg()
+
+
+def _seen(points: Array) -> Array:
+    """Parallel projection (n, 2) of points (n, 3)."""
+    x, y, z = points.T
+    right = -math.sin(AZIMUTH) * x + math.cos(AZIMUTH) * y
+    away = math.cos(AZIMUTH) * x + math.sin(AZIMUTH) * y
+    return np.stack([right, math.cos(ELEVATION) * z - math.sin(ELEVATION) * away], axis=-1)

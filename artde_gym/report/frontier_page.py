@@ -1,0 +1,100 @@
+"""The part of a report that shows a frontier."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from artde_gym.errors import StoreError
+from artde_gym.palette import looks
+from artde_gym.report.chart import Axis, Chart
+from artde_gym.report.html import Cell, figure, table
+from artde_gym.studies.frontier.axis import Axis as Varied
+from artde_gym.studies.frontier.result import RECORD, Frontier, value_text
+
+Rows = list[dict[Any, Any]]
+
+
+def read_frontier(folder: Path) -> tuple[Frontier, dict[str, Any]]:
+    """A frontier's folder, finished or not, and its record.
+
+    Raises:
+        StoreError: if it cannot be read.
+    """
+    try:
+        record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+        wanted = record["configuration"]
+        table, levels = (pd.read_csv(folder / name, keep_default_na=True) for name in ("frontier.csv", "levels.csv"))
+        varied, survival = Varied(**wanted["axis"]), wanted["survival"]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise StoreError("frontier", str(folder), "a folder in which at least one level was finished") from error
+    table["relation"] = table["relation"].fillna("")
+    return Frontier(table, levels, varied, survival, folder, bool(record.get("complete"))), record
+
+
+def answer(found: Frontier) -> tuple[str, list[str]]:
+    """A headline, and a sentence on each controller."""
+    axis, rows = found.axis, _records(found.table)
+    known = [row for row in rows if math.isfinite(row["frontier"]) and row["relation"] in ("=", ">=", "<=")]
+    lines = [_sentence(row, found) for row in rows]
+    if not known:
+        return f"No controller survives {axis.path} at any level that was tried.", lines
+    sign = 1 if axis.harder == "larger" else -1
+    best = max(sign * row["frontier"] for row in known)
+    first = [row["controller"] for row in known if sign * row["frontier"] == best]
+    reach = value_text(next(row for row in known if row["controller"] == first[0]), axis.unit)
+    head = f"{' and '.join(first)} {'go' if len(first) > 1 else 'goes'} farthest in {axis.path}: {reach}"
+    others = [f"{row['controller']} {value_text(row, axis.unit)}" for row in rows if row["controller"] not in first]
+    return head + (f" ({'; '.join(others)})." if others else "."), lines
+
+
+def parts(found: Frontier) -> list[str]:
+    """Chart and tables."""
+    axis = found.axis
+    shown = looks(str(row["controller"]) for row in _records(found.table))
+    x = Axis.of(f"{axis.path} ({axis.unit})" if axis.unit != "1" else axis.path, [axis.low, axis.high])
+    chart = Chart("Share of episodes without a fall against what was varied", x, Axis("no fall (%)", 0, 104), 460, 280)
+    chart.level(100 * found.survival, f"wanted: {100 * found.survival:g} %")
+    for i, (name, look) in enumerate(shown.items()):
+        rows = [row for row in _records(found.levels) if row["controller"] == name]
+        shift = (i - (len(shown) - 1) / 2) * 0.012 * (axis.high - axis.low)
+        places = [row["value"] + shift for row in rows]
+        chart.line(places, [100 * row["rate"] for row in rows], look, text=name, kind="path")
+        for place, row in zip(places, rows, strict=True):
+            chart.interval(place, 100 * row["low"], 100 * row["high"], look)
+            chart.marker(
+                place, 100 * row["rate"], look, f"{name} at {row['value']:g}: {row['survived']}/{row['episodes']}"
+            )
+    caption = "Survival with 95 % intervals (Wilson); markers side by side are one level."
+    lines = [
+        [Cell(f"{row['value']:g}", row["value"]), row["controller"], Cell(f"{row['survived']} of {row['episodes']}",
+         row["rate"]), Cell(f"{100 * row['low']:.0f}..{100 * row['high']:.0f}", row["low"])]
+        for row in _records(found.levels)
+    ]  # fmt: skip
+    unit = "" if axis.unit == "1" else f" ({axis.unit})"
+    return [
+        figure(caption, {"": chart.svg()}, shown),
+        table("Every level that was run", [f"{axis.path}{unit}", "controller", "no fall", "95 % interval (%)"], lines),
+    ]
+
+
+def _sentence(row: dict[Any, Any], found: Frontier) -> str:
+    axis = found.axis
+    text = value_text(row, axis.unit)
+    if not row["relation"]:
+        return f"{row['controller']}: not found yet."
+    easy, hard = ("low", "high") if axis.harder == "larger" else ("high", "low")
+    said = [f"{row['controller']}: {text}"]
+    for end, what in ((easy, "survives"), (hard, "no more at")):
+        if math.isfinite(row[end]):
+            share, low, high = (100 * row[f"{end}_rate{part}"] for part in ("", "_from", "_to"))
+            said.append(f"{what} {row[end]:g} in {share:.0f} % of the episodes ({low:.0f}..{high:.0f} %)")
+    return "; ".join(said) + "."
+
+
+def _records(frame: pd.DataFrame) -> Rows:
+    return frame.to_dict(orient="records")

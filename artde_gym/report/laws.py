@@ -1,0 +1,154 @@
+"""What the controllers of a run were: their gains, and what follows from them."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigh
+
+from artde_gym.arrays import Array
+from artde_gym.evaluation.console import REFERENCE
+from artde_gym.evaluation.environments import single
+from artde_gym.palette import OTHERS
+from artde_gym.registration import make_controller, registered_controllers
+from artde_gym.report.chart import Axis, Chart
+from artde_gym.report.html import Cell, details, figure, paragraph, table
+from artde_gym.report.run import Run
+from artde_gym.robots.dynamics import RigidBodyTree, joint_space_inertia
+
+SAMPLES = 200  # of the reference, at which the inertia is taken
+LOOP = {"position": "_p", "attitude": "_q"}
+
+Gains = Mapping[str, Any]
+
+
+class Laws:
+    """The gains of a run's controllers, built anew by their names; one of a name that is not registered has none."""
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self.gains = functools.cache(self._find_gains)  # scenario -> the same dict, found once a report
+
+    def robot(self, scenario: str) -> Any:
+        """The nominal robot (`RobotSpec`)."""
+        return self._environment(scenario).unwrapped.nominal_robot
+
+    def _find_gains(self, scenario: str) -> dict[str, Gains]:
+        """Controller -> gain -> value; those of a cascade's loops end in _p and _q."""
+        env, found, given = self._environment(scenario), {}, self._run.gains(scenario)
+        for name in self._run.result.controllers:
+            if name in registered_controllers():
+                policy = make_controller(name, env, **given.get(name, {}))
+                found[name] = dict(_flat(getattr(policy, "gains", None)))
+        return found
+
+    def lyapunov_matrix(self, scenario: str) -> tuple[str, Array, Array, Array] | None:
+        """(controller, p11, p12, p22) of P in A^T P + P A = -I, for one controller's Kp and Kd; None if none has them.
+
+        With scalar gains, p12 = 1 / (2 Kp), p22 = (1 + Kp) / (2 Kp Kd), p11 = Kd p12 + Kp p22.
+        """
+        gains = self.gains(scenario)
+        for name in sorted(gains, key=lambda name: name != REFERENCE):
+            for suffix in ("", "_p"):
+                if f"k_p{suffix}" in gains[name] and f"k_d{suffix}" in gains[name]:
+                    k_p, k_d = (np.asarray(gains[name][f"{gain}{suffix}"], dtype=np.float64) for gain in ("k_p", "k_d"))
+                    p12, p22 = 1 / (2 * k_p), (1 + k_p) / (2 * k_p * k_d)
+                    return name, k_d * p12 + k_p * p22, p12, p22
+        return None
+
+    def section(self, scenario: str) -> list[str]:
+        """Gains as a table, and the condition under which time-delay estimation converges."""
+        gains = self.gains(scenario)
+        names = list(dict.fromkeys(gain for own in gains.values() for gain in own))
+        rows = [[gain, *(_shown(own.get(gain)) for own in gains.values())] for gain in names]
+        parts = [details("Gains", table("Gains of the controllers (SI units)", ["gain", *gains], rows))] if rows else []
+        return parts + self._validity(scenario)
+
+    def _validity(self, scenario: str) -> list[str]:
+        """Eigenvalues of M^-1 m_bar, which have to lie in (0, 2)."""
+        nominal = {}
+        for name, own in self.gains(scenario).items():
+            for gain in ("m_bar", "m_bar_p", "m_bar_q"):
+                if gain in own:
+                    nominal.setdefault(json.dumps([gain, np.asarray(own[gain]).tolist()]), []).append(name)
+        if not nominal:
+            return []
+        robot = self.robot(scenario)
+        if not robot.actuated:
+            return [self._rigid_body(robot, nominal)]
+        episode = self._run.episode(scenario)
+        if episode is None:
+            return []
+        signals = next(iter(episode.signals.values()))
+        q = signals.fields["q_ref"][:: max(1, len(signals.time) // SAMPLES)].astype(np.float64)
+        time = signals.time[:: max(1, len(signals.time) // SAMPLES)]
+        inertia = joint_space_inertia(RigidBodyTree(robot).mass_matrix(q))
+        charts = {}
+        for key, names in nominal.items():
+            _, m_bar = json.loads(key)
+            weight = np.diag(np.broadcast_to(np.asarray(m_bar, dtype=np.float64), q.shape[1]))
+            values = np.array([eigh(weight, one, eigvals_only=True) for one in inertia])
+            title = f"m_bar = {_text(m_bar)}: {', '.join(names)}"
+            chart = Chart(f"Eigenvalues of M^-1 m_bar for {title}", Axis("time (s)", 0, float(time[-1])),
+                          Axis.of("eigenvalue (1)", values, [2.0], zero=True))  # fmt: skip
+            for column in values.T:
+                chart.line(time, column, OTHERS[2])
+            chart.level(2.0, "limit: 2")
+            verdict = "inside (0, 2)" if values.min() > 0 and values.max() < 2 else "outside (0, 2): it may diverge"
+            charts[f"{title}; {values.min():.3f} to {values.max():.3f}, {verdict}"] = chart.svg()
+        caption = (
+            "Time-delay estimation converges where every eigenvalue of M^-1 m_bar lies in (0, 2). M is the joint-space "
+            "inertia of the free robot along the reference, without payload."
+        )
+        return [figure(caption, charts)]
+
+    def _rigid_body(self, robot: Any, nominal: Mapping[str, list[str]]) -> str:
+        mass, inertia = robot.mass, np.asarray(robot.base.inertia)
+        rows = []
+        for key, names in nominal.items():
+            gain, m_bar = json.loads(key)
+            values = np.asarray(m_bar) / (inertia if gain.endswith("_q") else mass)
+            low, high = float(np.min(values)), float(np.max(values))
+            loop = "attitude" if gain.endswith("_q") else "position"
+            inside = low > 0 and high < 2
+            rows.append([
+                loop, Cell(", ".join(names), kind="text"), _text(m_bar), f"{low:.3f} to {high:.3f}",
+                Cell("inside (0, 2)" if inside else "outside (0, 2)", kind="holds" if inside else "fails"),
+            ])  # fmt: skip
+        caption = "Eigenvalues of M^-1 m_bar, without payload: time-delay estimation converges inside (0, 2)"
+        return table(caption, ["loop", "controllers", "m_bar (kg, kg m^2)", "eigenvalues", "verdict"], rows)
+
+    def _environment(self, scenario: str) -> Any:
+        cell = self._run.cell(scenario)
+        return single(cell["env_id"], json.dumps(cell["kwargs"]))
+
+
+def unavailable(error: Exception) -> str:
+    """What stands in place of this section where a controller or an environment cannot be built any more."""
+    return paragraph(f"Gains are not shown: {error}.", "soft")
+
+
+def _flat(gains: Any) -> Iterator[tuple[str, Any]]:
+    if not dataclasses.is_dataclass(gains):
+        return
+    for field in dataclasses.fields(gains):
+        value = getattr(gains, field.name)
+        if dataclasses.is_dataclass(value):
+            yield from ((f"{name}{LOOP.get(field.name, '')}", inner) for name, inner in _flat(value))
+        else:
+            yield field.name, value
+
+
+def _shown(value: Any) -> str | Cell:
+    if value is None or isinstance(value, (str, bool)):
+        return "" if value is None else str(value)
+    return Cell(_text(value), float(value) if np.ndim(value) == 0 else None)
+
+
+def _text(value: Any) -> str:
+    return ", ".join(f"{number:.4g}" for number in np.ravel(value))

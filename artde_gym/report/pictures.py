@@ -1,0 +1,221 @@
+"""Pictures and a video of the episode that a report shows, run once more from its seed.
+
+Episodes repeat bit for bit, so that a picture is of the very run whose signals are plotted. One that does not repeat,
+on another machine or with another release of an engine, is told by its fall, and is not shown as if it were the same.
+"""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import io
+import math
+import tempfile
+from collections.abc import Callable, Iterable, Mapping
+from html import escape
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from PIL import Image
+
+from artde_gym.errors import ArtdeGymError
+from artde_gym.evaluation.environments import robot_of
+from artde_gym.evaluation.evaluate import CUSTOM
+from artde_gym.evaluation.metrics import Span, events_of
+from artde_gym.registration import registered_controllers
+from artde_gym.report.answer import metric_of, ranking
+from artde_gym.report.html import figure, paragraph
+from artde_gym.report.run import Run, nested
+from artde_gym.video.frames import Shot, shots
+from artde_gym.video.recording import video
+
+WIDTH = 320  # pixels, of a picture
+PANEL = 400  # pixels, of a controller in a video
+FPS = 20.0  # of a video
+QUALITY = 72  # of a picture as WebP
+BEFORE_FALL = (1.2, 0.8, 0.4, 0.2, 0.0)  # s
+BEFORE_EVENT, AFTER_EVENT = 0.1, (0.3, 0.8, 1.5)  # s
+MOTION = 6  # pictures of the undisturbed motion
+PERIOD = {"ojas": ("walk", 6.0, 2.0), "q450": ("flight", 4.0, 29.0)}
+"""Robot -> its motion, when it has become periodic, and its period (s)."""
+LENGTH, LEAD = 10.0, 6.0  # s, of a video, and how much of it is before what is to be seen
+
+Progress = Callable[[str], None]
+
+
+class Sight(NamedTuple):
+    """One picture of a strip: when (s), and what it shows in words."""
+
+    strip: str
+    time_s: float
+    text: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Album:
+    """Pictures, and perhaps videos, of a run.
+
+    Attributes:
+        pictures, videos: what is asked for.
+        on_progress: called with what is being drawn.
+    """
+
+    run: Run
+    pictures: bool = True
+    videos: bool = False
+    on_progress: Progress = lambda _: None
+
+    def figures(self, scenario: str) -> list[str]:
+        """What there is to see of a scenario; a sentence in place of what cannot be drawn here."""
+        parts: list[str] = []
+        for wanted, draw in ((self.videos, self._video), (self.pictures, self._pictures)):
+            if wanted:
+                try:
+                    parts += draw(scenario)
+                except (ArtdeGymError, ValueError) as error:  # no OpenGL, no ffmpeg, a controller of then
+                    parts.append(paragraph(f"Nothing is drawn here: {error}.", "soft"))
+        return parts
+
+    def _pictures(self, scenario: str) -> list[str]:
+        number = self._number(scenario)
+        figures, missed = [], []
+        for place, name in enumerate(self._drawable(scenario)):
+            row = self._row(scenario, name, number)
+            sights = _falling(name, row)
+            if place == 0:  # the best one
+                sights = [*self._moving(scenario, name, row), *_events(name, row), *sights]
+            if not sights:
+                continue
+            self.on_progress(f"pictures of {name} in {scenario}")
+            seen = self._seen(scenario, name, row, sights)
+            if not _repeats(row, seen):
+                missed.append(name)
+                continue
+            strips: dict[str, dict[str, str]] = {}
+            for sight in sights:
+                strips.setdefault(sight.strip, {})[sight.text] = _image(seen[sight.time_s], sight)
+            figures += [figure(f"{strip}, episode {number}.", images, kind="shots") for strip, images in strips.items()]
+        if missed:
+            said = (
+                "did not repeat the stored episode (another machine, or other versions?), so there is no picture of it"
+            )
+            figures.append(paragraph(f"{', '.join(missed)} {said}.", "soft"))
+        return figures
+
+    def _video(self, scenario: str) -> list[str]:
+        number, names = self._number(scenario), self._drawable(scenario)
+        if not names:
+            return []
+        self.on_progress(f"video of {scenario}")
+        start = max(0.0, self._moment(scenario, [self._row(scenario, name, number) for name in names]) - LEAD)
+        kwargs = dict(self.run.cell(scenario)["kwargs"])
+        with tempfile.TemporaryDirectory() as folder:
+            file = video(
+                names,
+                Path(folder) / "video.mp4",
+                self.run.cell(scenario)["env_id"],
+                scenario=None if scenario == CUSTOM else scenario,
+                disturbances=kwargs.pop("disturbances", None),
+                env_kwargs=kwargs,
+                gains=self.run.gains(scenario),
+                seed=self.run.record["configuration"]["seed"],
+                episode=number,
+                start=start,
+                end=start + LENGTH,
+                width=PANEL,
+                fps=FPS,
+                columns=min(3, len(names)),
+            )
+            data = base64.b64encode(file.read_bytes()).decode()
+        label = escape(f"{scenario}: {', '.join(names)} on the same seed", quote=True)
+        moving = f'<video controls muted playsinline aria-label="{label}" src="data:video/mp4;base64,{data}"></video>'
+        caption = f"{', '.join(names)} on the same seed, episode {number}, from {start:.0f} s on."
+        return [figure(caption, {"": moving}, kind="film")]
+
+    def _moment(self, scenario: str, rows: list[Row]) -> float:
+        """What a video should not miss: the first fall, else the first later event, else the motion."""
+        falls = [float(row["time_to_fall_s"]) for row in rows if row["fell"]]
+        if falls:
+            return min(falls)
+        _, settled, _ = PERIOD[robot_of(self.run.cell(scenario)["env_id"])]
+        later = [begin for begin, _ in _spans(rows[0]).values() if begin > settled]
+        return min([*later, settled + LEAD])
+
+    def _moving(self, scenario: str, name: str, row: Row) -> list[Sight]:
+        """One period of the motion."""
+        motion, settled, period = PERIOD[robot_of(self.run.cell(scenario)["env_id"])]
+        start, span = min(settled, 0.3 * row["duration_s"]), min(period, 0.6 * row["duration_s"])
+        times = [start + span * i / MOTION for i in range(MOTION)]
+        return [Sight(f"The {motion} under {name}", time, f"{time:.2f} s") for time in times]
+
+    def _seen(self, scenario: str, name: str, row: Row, sights: Iterable[Sight]) -> dict[float, Shot]:
+        """Shots by the time that they were wanted at; none after the end of an episode that ended earlier."""
+        cell, times = self.run.cell(scenario), sorted({sight.time_s for sight in sights})
+        spec, gains = registered_controllers()[name], self.run.gains(scenario).get(name, {})
+        return dict(
+            zip(times, shots(cell["env_id"], cell["kwargs"], spec, gains, int(row["seed"]), times, WIDTH), strict=False)
+        )
+
+    def _number(self, scenario: str) -> int:
+        """The episode that the report's plots show, or the first one."""
+        shown = self.run.episode(scenario)
+        return shown.number if shown else min(self.run.result.episodes["episode"].tolist())
+
+    def _row(self, scenario: str, name: str, number: int) -> Row:
+        return {str(key): value for key, value in self.run.result.rows(scenario, name).loc[number].items()}
+
+    def _drawable(self, scenario: str) -> list[str]:
+        """Controllers that finished the episode and can be built by their name, the best one first."""
+        number, result = self._number(scenario), self.run.result
+        order = ranking(result, scenario, metric_of(self.run.tracking(scenario)))
+        done = [name for name in order if number in result.rows(scenario, name).index]
+        return [name for name in done if name in registered_controllers()]
+
+
+Row = Mapping[str, Any]
+
+
+def _falling(name: str, row: Row) -> list[Sight]:
+    if not row["fell"]:
+        return []
+    fall, strip = float(row["time_to_fall_s"]), f"The fall of {name}"
+    times = [(before, fall - before) for before in BEFORE_FALL if before < fall]
+    return [Sight(strip, time, f"{before:g} s before" if before else f"at {fall:.2f} s") for before, time in times]
+
+
+def _events(name: str, row: Row) -> list[Sight]:
+    """Before, during and after each push and drop that the episode reached."""
+    sights = []
+    for event, (begin, end) in _spans(row).items():
+        strip = f"{event} at {begin:g} s{_force(row, event)} under {name}"
+        times = {"before": begin - BEFORE_EVENT, "in the middle": (begin + end) / 2}
+        times |= {f"{after:g} s after": end + after for after in AFTER_EVENT}
+        sights += [Sight(strip, time, text) for text, time in times.items() if 0 <= time <= row["duration_s"]]
+    return sights
+
+
+def _force(row: Row, event: str) -> str:
+    size, body = (row.get(f"disturbance.push.{event.removeprefix('push')}.{key}") for key in ("magnitude", "body"))
+    return "" if size is None else f" ({size:.3g} N on {str(body).replace('_', ' ')})"
+
+
+def _spans(row: Row) -> Mapping[str, Span]:
+    """The episode's pushes and drop."""
+    drawn = nested({key: value for key, value in row.items() if key.startswith("disturbance.")})
+    return {event: span for event, span in events_of(drawn).items() if span[0] < row["duration_s"]}
+
+
+def _repeats(row: Row, seen: Mapping[float, Shot]) -> bool:
+    """Whether a run went as the stored one: the same fall at the same time, or none."""
+    falls = [shot.time_s for shot in seen.values() if shot.over and shot.fall_reason]
+    expected = [float(row["time_to_fall_s"])] if row["fell"] else []
+    return len(falls) == len(expected) and all(map(math.isclose, falls, expected))
+
+
+def _image(shot: Shot, sight: Sight) -> str:
+    buffer = io.BytesIO()
+    Image.fromarray(shot.picture).save(buffer, "WEBP", quality=QUALITY, method=6)
+    text = escape(f"{sight.strip}: {sight.text}", quote=True)
+    height, width, _ = shot.picture.shape
+    data = base64.b64encode(buffer.getvalue()).decode()
+    return f'<img alt="{text}" width="{width}" height="{height}" src="data:image/webp;base64,{data}">'

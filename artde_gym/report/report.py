@@ -1,0 +1,192 @@
+"""`report.html` of a results folder."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from artde_gym.arguments import reading
+from artde_gym.errors import StoreError
+from artde_gym.evaluation.environments import robot_of
+from artde_gym.evaluation.store import write_atomically
+from artde_gym.report import biped, diagram, flight, frontier_page, signals, tables, training_page
+from artde_gym.report.answer import headline, sentences
+from artde_gym.report.html import bullets, page, paragraph, section
+from artde_gym.report.laws import Laws, unavailable
+from artde_gym.report.pictures import Album, Progress
+from artde_gym.report.run import Episode, Run
+from artde_gym.scenarios import SCENARIOS
+from artde_gym.studies.frontier.result import RECORD
+
+NAME = "report.html"
+_LAST = ("Reference and loop", "Provenance")
+
+
+def write_report(
+    folder: str | Path, *, pictures: bool = False, videos: bool = False, on_progress: Progress = lambda _: None
+) -> Path:
+    """Write the report of an evaluation, a frontier or a training into its folder; an interrupted one has one, too.
+
+    Args:
+        folder: what `evaluate`, `reproduce`, `frontier` or `train` wrote.
+        pictures: of an evaluation: whether to run the shown episodes again for pictures of motion, pushes and falls.
+        videos: likewise, for a video of each scenario (about a megabyte each).
+        on_progress: called with what is being drawn.
+
+    Returns:
+        The file.
+
+    Raises:
+        StoreError: if the folder holds nothing to report.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise StoreError("results folder", str(folder), "a folder that `evaluate`, `frontier` or `train` wrote")
+    wanted = "one that `evaluate`, `frontier` or `train` of this release wrote"
+    with reading("results folder", folder, wanted, StoreError):
+        if (folder / RECORD).exists():
+            text = _frontier(folder)
+        elif (folder / training_page.RECORD).exists():
+            text = _training(training_page.read_training(folder))
+        else:
+            run = Run.read(folder)
+            text = _evaluation(run, Album(run, pictures, videos, on_progress))
+    write_atomically(folder / NAME, lambda file: file.write(text.encode()))
+    return folder / NAME
+
+
+def _evaluation(run: Run, album: Album) -> str:
+    result = run.result
+    if not len(result.episodes):
+        return page("artde-gym report", ["<h1>No episode was finished yet</h1>", _origin(run.record)])
+    trackings = {scenario: run.tracking(scenario) for scenario in result.scenarios}
+    said = {scenario: sentences(result, scenario, trackings[scenario]) for scenario in result.scenarios}
+    title = f"{', '.join(result.controllers)} in {', '.join(result.scenarios)}"
+    lone = len(said) == 1
+    short = said if lone else {scenario: lines[:2] for scenario, lines in said.items()}
+    body = [f"<h1>{escape(title)}</h1>", _answer(headline(result, trackings), short)]
+    if not result.complete:
+        body.append(paragraph("Interrupted or still running: this holds the episodes that were finished."))
+    body.append(_contents([*(["Claims"] if run.claims is not None else []), *result.scenarios, *_LAST]))
+    if run.claims is not None:
+        body.append(_anchored("Claims", tables.claims(run.claims)))
+    laws = Laws(run)
+    body += [_scenario(run, laws, album, name, [] if lone else lines) for name, lines in said.items()]
+    body += [_anchored("Reference and loop", *_plants(run)), _anchored("Provenance", _origin(run.record))]
+    return page(f"artde-gym: {title}", body)
+
+
+def _plants(run: Run) -> list[str]:
+    """What the scenarios share: a block diagram of each robot's loop, and each walking pattern once."""
+    parts: dict[str, list[str]] = {}
+    for scenario in run.result.scenarios:
+        cell = run.cell(scenario)
+        if robot_of(cell["env_id"]) == "ojas":
+            arguments = biped.pattern_of(cell["kwargs"])
+            parts.setdefault("ojas", [diagram.joint_loop()])
+            key = f"pattern {json.dumps(arguments)}"
+            if key not in parts:
+                parts[key] = biped.reference(arguments)
+        else:
+            parts.setdefault("q450", [diagram.cascade()])
+    return [part for several in parts.values() for part in several]
+
+
+def _scenario(run: Run, laws: Laws, album: Album, scenario: str, said: list[str]) -> str:
+    entry, cell = SCENARIOS.get(scenario), run.cell(scenario)
+    parts = [paragraph(f"{cell['env_id']}: {entry.text}." if entry else f"{cell['env_id']}.", "soft")]
+    parts += [bullets(said) if said else "", tables.falls(run, scenario)]
+    if run.result.episodes.loc[run.result.episodes["scenario"] == scenario, "fell"].any():
+        parts.append(tables.survival(run, scenario))
+    parts += album.figures(scenario)
+    parts += tables.metrics(run, scenario)
+    parts.append(tables.events(run, scenario))
+    episode = run.episode(scenario)
+    if episode is None:
+        parts.append(paragraph("No signals were stored for this scenario, so there are no plots over time.", "soft"))
+    else:
+        parts += _episode(run, laws, scenario, episode)
+    return _anchored(scenario, *parts)
+
+
+def _episode(run: Run, laws: Laws, scenario: str, episode: Episode) -> list[str]:
+    tracking = run.tracking(scenario)
+    parts = [*signals.tracking_error(episode, tracking), signals.gains(episode)]
+    try:
+        matrix = laws.lyapunov_matrix(scenario)
+        if matrix is not None:
+            parts.append(signals.lyapunov(episode, tracking, matrix))
+        inside = laws.section(scenario)
+    except ValueError as error:  # a controller, a gain or an environment of then that is none any more
+        inside = [unavailable(error)]
+    walks = robot_of(run.cell(scenario)["env_id"]) == "ojas"
+    return [*parts, *(biped if walks else flight).figures(episode), *inside]
+
+
+def _frontier(folder: Path) -> str:
+    found, record = frontier_page.read_frontier(folder)
+    head, lines = frontier_page.answer(found)
+    wanted = record["configuration"]
+    title = f"Frontier of {found.axis.path} in {wanted['env']}"
+    body = [f"<h1>{escape(title)}</h1>", _answer(head, {"": lines})]
+    if not found.complete:
+        body.append(paragraph("Interrupted or still running: this holds the levels that were finished."))
+    body += frontier_page.parts(found)
+    body.append(_anchored("Provenance", _origin(record)))
+    return page(f"artde-gym: {title}", body)
+
+
+def _training(run: training_page.Trained) -> str:
+    head, lines = training_page.answer(run)
+    title = f"Training of {run.name} in {run.record['configuration']['env_id']}"
+    body = [f"<h1>{escape(title)}</h1>", _answer(head, {"": lines}), *training_page.parts(run)]
+    packages = {"packages": ", ".join(f"{name} {version}" for name, version in run.record["versions"].items())}
+    body.append(_anchored("Provenance", _facts(packages, run.record["configuration"])))
+    return page(f"artde-gym: {title}", body)
+
+
+def _answer(head: str, said: Mapping[str, list[str]]) -> str:
+    parts = [f"<p><strong>{escape(head)}</strong></p>"]
+    for name, lines in said.items():
+        parts.append(bullets(lines) if len(said) == 1 else paragraph(f"{name}: {' '.join(lines)}"))
+    return '<section class="answer"><h2>The answer</h2>' + "".join(parts) + "</section>"
+
+
+def _contents(titles: list[str]) -> str:
+    links = "".join(f'<li><a href="#{_anchor(title)}">{escape(title)}</a></li>' for title in titles)
+    return f'<nav aria-label="Contents"><ul>{links}</ul></nav>'
+
+
+def _anchored(title: str, *parts: str) -> str:
+    return f'<div id="{_anchor(title)}">{section(title, *parts)}</div>'
+
+
+def _anchor(title: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "-", title.lower())
+
+
+def _origin(record: Mapping[str, Any]) -> str:
+    """Everything that is needed to run the same again."""
+    origin = record["provenance"]
+    facts = {
+        "command": origin["command"],
+        "time": origin["time"],
+        "commit": origin["commit"] or "of an installed package",
+        "Python": f"{origin['python']} on {origin['platform']}",
+        "packages": ", ".join(f"{name} {version}" for name, version in origin["packages"].items()),
+    }
+    return _facts(facts, record["configuration"])
+
+
+def _facts(facts: Mapping[str, str], configuration: Mapping[str, Any]) -> str:
+    rows = "".join(f"<dt>{escape(key)}</dt><dd><code>{escape(str(value))}</code></dd>" for key, value in facts.items())
+    whole = escape(json.dumps(configuration, indent=1))
+    return (
+        f"<dl>{rows}</dl><details><summary>Full configuration</summary>"
+        '<div class="scroll" role="region" aria-label="Full configuration" tabindex="0">'
+        f"<pre><code>{whole}</code></pre></div></details>"
+    )

@@ -1,0 +1,225 @@
+"""Tables of a scenario with intervals, the thesis' values beside ours, and charts of the same numbers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+
+from artde_gym.evaluation import statistics, thesis
+from artde_gym.evaluation.console import ALL, REFERENCE, UNITS, measured
+from artde_gym.evaluation.statistics import Estimate
+from artde_gym.palette import looks
+from artde_gym.report.chart import Axis, Chart
+from artde_gym.report.html import Cell, details, figure, table
+from artde_gym.report.run import Run
+from artde_gym.scenarios import SCENARIOS
+
+VERDICTS = {"holds": "holds", "does not hold": "fails", "undecided": "open", "not measured": "soft"}
+WIDE = 460
+
+
+def claims(judged: pd.DataFrame) -> str:
+    """The thesis' claims, each with its verdict."""
+    rows = [
+        [scenario, Cell(claim, kind="text"), Cell(verdict, kind=VERDICTS.get(verdict, "")), Cell(ours, kind="text"),
+         Cell(printed, kind="text")]
+        for scenario, claim, verdict, ours, printed in judged.itertuples(index=False, name=None)
+    ]  # fmt: skip
+    columns = ["scenario", "claim", "verdict", "measured", "thesis"]
+    return table("Claims of the thesis, judged by the episodes at 95 %", columns, rows)
+
+
+def falls(run: Run, scenario: str) -> str:
+    """Falls with Wilson's interval, the time until them, and how the thesis' run ended."""
+    result, reference = run.result, _reference(scenario)
+    rows = []
+    for name in result.controllers:
+        count, rate = result.falls(scenario, name)
+        time = statistics.mean(result.values(scenario, name, "time_to_fall_s"))
+        rows.append([
+            name,
+            Cell(f"{count} of {rate.n}", rate.value),
+            Cell(_percent(rate), rate.value),
+            Cell(_text(time, 1), time.value if time.n else None),
+            thesis.ending(reference, name),
+        ])  # fmt: skip
+    columns = ["controller", "falls", "rate (95 % interval)", "time to fall (s)", "thesis"]
+    return table(f"{scenario}: episodes that ended in a fall", columns, rows)
+
+
+def survival(run: Run, scenario: str) -> str:
+    """The share of episodes that has not fallen yet, over time."""
+    result = run.result
+    shown = looks(result.controllers)
+    end = float(result.episodes.loc[result.episodes["scenario"] == scenario, "duration_s"].max())
+    chart = Chart(
+        f"{scenario}: share of episodes without a fall, over time",
+        Axis("time (s)", 0.0, end),
+        Axis("not fallen yet (%)", 0.0, 104.0),
+        WIDE,
+        240,
+    )
+    for name in result.controllers:
+        rows = result.rows(scenario, name)
+        if rows.empty:
+            continue
+        times = np.sort(rows["time_to_fall_s"].dropna().to_numpy(dtype=np.float64))
+        x = np.concatenate([[0.0], np.repeat(times, 2), [end]])
+        y = 100.0 * (1.0 - np.repeat(np.arange(len(times) + 1), 2) / len(rows))
+        chart.line(x, y, shown[name], text=name, kind="path")
+        chart.marker(end, float(y[-1]), shown[name], f"{name}: {y[-1]:.0f} %")
+    caption = "Survival: the share of episodes in which the robot has not fallen yet."
+    printed = thesis.TIME_TO_FALL.get(_reference(scenario) or "", {})
+    for name, time in printed.items():
+        if name in shown and time <= end:
+            chart.cross(time, 50.0, shown[name], f"{name} fell at {time:g} s in the thesis")
+            caption += f" Cross at half height: {name} fell at {time:g} s in the thesis."
+    return figure(caption, {"": chart.svg()}, shown)
+
+
+def metrics(run: Run, scenario: str) -> list[str]:
+    """Every metric by axis and controller; the main one open with a chart, the others folded away."""
+    entry = SCENARIOS.get(scenario)
+    parts = []
+    for number, (metric, title, axes) in enumerate(measured(run.tracking(scenario), entry.phases if entry else ())):
+        lines = _table(run, scenario, metric, title, axes)
+        parts.append(_dots(run, scenario, metric, title, axes) + lines if number == 0 else details(title, lines))
+    return parts
+
+
+def events(run: Run, scenario: str) -> str:
+    """What follows each push and drop: the peak of the error, and the time until it is back."""
+    result, main = run.result, run.tracking(scenario).errors[0]
+    text, digits = UNITS[main.unit]
+    peak = f"peak_error_{main.unit}_"
+    rows = []
+    for event in (name.removeprefix(peak) for name in result.metrics if name.startswith(peak)):
+        for name in result.controllers:
+            peaks = result.values(scenario, name, peak + event)
+            times = result.values(scenario, name, f"recovery_time_s_{event}")
+            reached = int(np.isfinite(peaks).sum())
+            if not reached:
+                continue
+            height, back = statistics.mean(peaks), statistics.mean(times)
+            never = int(np.isinf(times).sum())
+            rows.append([
+                event,
+                name,
+                Cell(f"{reached} of {len(peaks)}", reached),
+                Cell(_text(height, digits), height.value),
+                Cell(_text(back, 2), back.value if back.n else None),
+                Cell(str(never), never),
+            ])  # fmt: skip
+    if not rows:
+        return ""
+    columns = [
+        "event",
+        "controller",
+        "episodes that reached it",
+        f"peak error ({text})",
+        "recovery (s)",
+        "never recovered",
+    ]
+    return table(f"{scenario}: after pushes and drops (95 % intervals)", columns, rows)
+
+
+def _table(run: Run, scenario: str, metric: str, title: str, axes: list[str]) -> str:
+    result, reference = run.result, _reference(scenario)
+    rivals = REFERENCE in result.controllers and len(result.controllers) > 1
+    digits = _digits(metric)
+    rows = []
+    for axis in axes:
+        column = metric if axis == ALL else f"{metric}_{axis}"
+        for name in result.controllers:
+            mean = statistics.mean(result.values(scenario, name, column))
+            printed = thesis.value(reference, name, metric, axis)
+            row = [
+                axis,
+                name,
+                Cell(_text(mean, digits), mean.value if mean.n else None),
+                Cell("" if printed is None else f"{printed:.{digits}f}", printed),
+            ]
+            if rivals:
+                row += _against(run, scenario, column, name)
+                row.append(_printed_change(reference, metric, axis, name))
+            rows.append(row)
+    columns = ["axis", "controller", "ours (95 % interval)", "thesis"]
+    if rivals:
+        columns += [f"{REFERENCE} against it (%)", f"{REFERENCE} smaller (% of seeds)", "same in the thesis (%)"]
+    return table(f"{scenario}: {title}", columns, rows)
+
+
+def _against(run: Run, scenario: str, column: str, rival: str) -> list[str | Cell]:
+    if rival == REFERENCE:
+        return ["", ""]
+    ours, theirs = run.result.pairs(scenario, REFERENCE, rival, column)
+    gain = statistics.improvement(ours, theirs)
+    if not gain.n:
+        return ["", ""]
+    wins = 100 * statistics.win_probability(ours, theirs)
+    change = Estimate(-gain.value, -gain.high, -gain.low, gain.n)
+    return [Cell(_text(change, 1, sign="+"), change.value), Cell(f"{wins:.0f}", wins)]
+
+
+def _printed_change(reference: str | None, metric: str, axis: str, rival: str) -> str | Cell:
+    ours, theirs = (thesis.value(reference, name, metric, axis) for name in (REFERENCE, rival))
+    if ours is None or theirs is None or rival == REFERENCE:
+        return ""
+    change = 100 * (ours / theirs - 1)
+    return Cell(f"{change:+.1f}", change)
+
+
+def _dots(run: Run, scenario: str, metric: str, title: str, axes: list[str]) -> str:
+    """Means with their intervals side by side, and the thesis' values as short marks."""
+    result, reference = run.result, _reference(scenario)
+    shown, count = looks(result.controllers), len(result.controllers)
+    points: list[tuple[float, str, Estimate, float | None]] = []
+    for place, axis in enumerate(axes):
+        column = metric if axis == ALL else f"{metric}_{axis}"
+        for i, name in enumerate(result.controllers):
+            x = place + 0.7 * ((i + 0.5) / count - 0.5)
+            mean = statistics.mean(result.values(scenario, name, column))
+            points.append((x, name, mean, thesis.value(reference, name, metric, axis)))
+    numbers = [value for _, _, mean, printed in points for value in (*mean[:3], printed) if value is not None]
+    chart = Chart(
+        f"{scenario}: {title} of each axis and controller with 95 % intervals",
+        Axis("axis", -0.5, len(axes) - 0.5),
+        Axis.of(title, numbers, log=True),
+        WIDE,
+        300,
+        names={axis: float(place) for place, axis in enumerate(axes)},
+    )
+    for x, name, mean, printed in points:
+        if printed is not None:
+            chart.dash(x, printed, f"{name} in the thesis: {printed:g}")
+        if math.isfinite(mean.low):
+            chart.interval(x, mean.low, mean.high, shown[name])
+        chart.marker(x, mean.value, shown[name], f"{name}: {_text(mean, _digits(metric))}")
+    caption = f"{title}, mean with its 95 % interval"
+    if any(printed is not None for *_, printed in points):
+        caption += "; a short bar is the thesis' value for the controller in its column"
+    return figure(f"{caption}.", {"": chart.svg()}, shown)
+
+
+def _reference(scenario: str) -> str | None:
+    entry = SCENARIOS.get(scenario)
+    return entry.thesis if entry else None
+
+
+def _digits(metric: str) -> int:
+    return next(digits for unit, (_, digits) in UNITS.items() if unit in metric.split("_"))
+
+
+def _text(estimate: Estimate, digits: int, sign: str = "") -> str:
+    if not estimate.n:
+        return ""
+    span = (
+        f" ({estimate.low:{sign}.{digits}f}..{estimate.high:{sign}.{digits}f})" if math.isfinite(estimate.low) else ""
+    )
+    return f"{estimate.value:{sign}.{digits}f}{span}"
+
+
+def _percent(rate: Estimate) -> str:
+    return "" if not rate.n else f"{100 * rate.value:.0f} % ({100 * rate.low:.0f}..{100 * rate.high:.0f})"

@@ -1,0 +1,161 @@
+"""What a frontier varies: a path to one number, its range and its grid."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from artde_gym.disturbances import KINDS
+from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.evaluation.environments import arguments_of, robot_of
+from artde_gym.studies.frontier.standard import Harder, standard_for
+
+FINEST = 1e-6  # tolerance relative to the ends; finer steps would drown in the digits of a level's name
+
+
+ARGUMENT_UNITS = {"control_period": "s", "speed": "m/s", "step_duration": "s", "duration": "s"}
+
+
+@dataclasses.dataclass(frozen=True)
+class Axis:
+    """One number to vary, from `low` to `high` in steps of `tolerance`, all in `unit`.
+
+    Attributes:
+        kind: of the disturbance; None for an argument of the environment.
+        name: of the disturbance's parameter, or of the argument.
+    """
+
+    kind: str | None
+    name: str
+    unit: str
+    low: float
+    high: float
+    tolerance: float
+    harder: Harder
+
+    @property
+    def path(self) -> str:
+        return self.name if self.kind is None else f"{self.kind}.{self.name}"
+
+    @property
+    def levels(self) -> list[float]:
+        """The grid, the easiest level first; its last step may be shorter than the others."""
+        count = math.ceil((self.high - self.low) / self.tolerance - FINEST)
+        start, step = (self.low, self.tolerance) if self.harder == "larger" else (self.high, -self.tolerance)
+        end = self.high if self.harder == "larger" else self.low
+        return [start, *(float(f"{start + i * step:.10g}") for i in range(1, count)), end]
+
+    def place(
+        self, value: float, disturbances: Mapping[str, Any], arguments: Mapping[str, Any]
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Disturbances and arguments of the environment with `value` in its place, the given ones left alone.
+
+        Raises:
+            OptionError: if the varied disturbance takes a list and none is given.
+        """
+        if self.kind is None:
+            return dict(disturbances), {**arguments, self.name: value}
+        return placed(disturbances, self.kind, self.name, value), dict(arguments)
+
+
+def placed(disturbances: Mapping[str, Any], kind: str, name: str, value: Any) -> dict[str, Any]:
+    """Disturbances with `value` for one parameter of a kind, in all its entries; the given ones are left alone.
+
+    Raises:
+        OptionError: for a kind that takes a list, if none is given.
+    """
+    given = disturbances.get(kind)
+    if not KINDS[kind].repeated:
+        return {**disturbances, kind: {**_parameters(kind, given), name: value}}
+    entries = [given] if isinstance(given, Mapping) else given
+    if not (isinstance(entries, (list, tuple)) and entries and all(isinstance(entry, Mapping) for entry in entries)):
+        raise OptionError("disturbances", given, f"with a list of at least one {kind!r}: it is varied")
+    return {**disturbances, kind: [{**entry, name: value} for entry in entries]}
+
+
+def _parameters(kind: str, given: Any) -> dict[str, Any]:
+    """A disturbance's parameters, also from the short form of a bare number or distribution."""
+    if given is None:
+        return {}
+    scalar = KINDS[kind].scalar
+    names = {parameter.name for parameter in KINDS[kind].parameters}
+    if isinstance(given, Mapping) and (scalar is None or not names.isdisjoint(given)):
+        return dict(given)
+    return {str(scalar): given}
+
+
+def axis(
+    env_id: str,
+    path: str,
+    low: float | None = None,
+    high: float | None = None,
+    tolerance: float | None = None,
+    harder: Harder | None = None,
+) -> Axis:
+    """The axis at `path`: "kind.parameter" of `artde_gym.disturbances.KINDS`, or an argument of the environment.
+
+    Raises:
+        UnknownNameError: if there is no number at this path.
+        OptionError: for a range that is missing, empty, off the grid of whole numbers, or not allowed.
+    """
+    kind, name, unit = _find(env_id, path)
+    standard = standard_for(env_id)
+    default = None if standard is None else standard.ranges.get(path)
+    ends: dict[str, float] = {}
+    for field, given in (("low", low), ("high", high), ("tolerance", tolerance)):
+        value = given if given is not None or default is None else getattr(default, field)
+        if value is None:
+            raise OptionError(field, None, f"a number: {path} has no default range")
+        if isinstance(value, bool) or not (isinstance(value, (int, float)) and math.isfinite(value)):
+            raise OptionError(field, value, "a finite number")
+        ends[field] = float(value)
+    if harder not in (None, "larger", "smaller"):
+        raise OptionError("harder", harder, "'larger', 'smaller'")
+    chosen = Axis(kind, name, unit, **ends, harder=harder or (default.harder if default else "larger"))
+    _check(chosen, None if standard is None else standard.time_step)
+    return chosen
+
+
+def _find(env_id: str, path: str) -> tuple[str | None, str, str]:
+    robot = robot_of(env_id)
+    disturbances = {
+        f"{kind.name}.{parameter.name}": (kind.name, parameter.name, parameter.unit)
+        for kind in KINDS.values()
+        if robot in kind.robots
+        for parameter in kind.parameters
+        if parameter.size == 1
+    }
+    numbers = [
+        name
+        for name, argument in arguments_of(env_id).items()
+        if isinstance(argument.default, (int, float)) and not isinstance(argument.default, bool)
+    ]
+    if path in disturbances:
+        return disturbances[path]
+    if path in numbers:
+        return None, path, ARGUMENT_UNITS.get(path, "1")
+    raise UnknownNameError("vary", path, among(path, [*disturbances, *numbers]))
+
+
+def _check(varied: Axis, time_step: float | None) -> None:
+    if varied.low >= varied.high:
+        raise OptionError("low", varied.low, f"below high, which is {varied.high:g}")
+    span = varied.high - varied.low
+    finest = FINEST * max(abs(varied.low), abs(varied.high))
+    if not finest <= varied.tolerance <= span * (1 + FINEST):  # 0.3 - 0.2 is less than 0.1
+        raise OptionError("tolerance", varied.tolerance, f"{finest:g} to high - low, which is {span:g}")
+    quantum = time_step if varied.path == "control_period" else None
+    if varied.kind is not None:
+        (parameter,) = (p for p in KINDS[varied.kind].parameters if p.name == varied.name)
+        for field, value in (("low", varied.low), ("high", varied.high)):
+            if not parameter.low <= value <= parameter.high:
+                raise OptionError(field, value, f"{parameter.low:g} to {parameter.high:g} for {varied.path}")
+        quantum = 1.0 if parameter.integer else None
+    if quantum is None:
+        return
+    for field in ("low", "high", "tolerance"):
+        value = getattr(varied, field)
+        if not math.isclose(value, round(value / quantum) * quantum, rel_tol=1e-9, abs_tol=1e-12):
+            raise OptionError(field, value, f"a whole multiple of {quantum:g} for {varied.path}")

@@ -1,0 +1,59 @@
+"""A frontier as a table for a terminal."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from artde_gym.studies.frontier.result import Frontier, value_text
+
+
+def print_frontier(found: Frontier, console: Console) -> None:
+    """Print each controller's frontier, with survival and its interval at both ends of the bracket."""
+    axis = found.axis
+    console.print()
+    if found.levels.empty:
+        console.print("No level was finished.")
+    else:
+        console.print(Text(f"Frontier of {axis.path}", style="bold"))
+        wanted = f"{100 * found.survival:g} %"
+        most = "largest" if axis.harder == "larger" else "smallest"
+        count = max(found.levels["episodes"].tolist())
+        note = (
+            f"{most} value at which at least {wanted} of {count} seeded episodes end without a fall, on a grid of "
+            f"{_value(axis.tolerance, axis.unit)} from {axis.low:g} to {_value(axis.high, axis.unit)}; the intervals "
+            "say how far the true rates may be from the observed ones"
+        )
+        console.print(Text(note, style="dim"))
+        console.print(_table(found))
+    if not found.complete:
+        console.print("Interrupted: the same command continues; finished episodes are kept.")
+    if found.folder is not None:
+        console.print(f"Written to {found.folder}")
+
+
+def _table(found: Frontier) -> Table:
+    unit = "" if found.axis.unit == "1" else f" ({found.axis.unit})"
+    columns = ("controller", f"frontier{unit}", "survival (95 %)", f"fails at{unit}", "survival (95 %)")
+    table = Table(*columns, box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
+    easy, hard = ("low", "high") if found.axis.harder == "larger" else ("high", "low")
+    for row in found.table.to_dict(orient="records"):
+        fails = f"{row[hard]:g}" if math.isfinite(row[hard]) else "-"
+        table.add_row(str(row["controller"]), value_text(row, "1"), _share(row, easy), fails, _share(row, hard))
+    return table
+
+
+def _share(row: dict[Any, Any], end: str) -> str:
+    if not math.isfinite(row[end]):
+        return "-"
+    share, low, high = (f"{100 * row[f'{end}_rate{part}']:.0f}" for part in ("", "_from", "_to"))
+    return f"{share} % ({low}..{high})"
+
+
+def _value(value: float, unit: str) -> str:
+    return f"{value:g}" if unit == "1" else f"{value:g} {unit}"

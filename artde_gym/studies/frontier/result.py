@@ -1,0 +1,47 @@
+"""The result of a frontier: a row for each controller, and the levels that were tested."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from artde_gym.studies.frontier.axis import Axis
+
+RECORD = "frontier.json"
+
+
+@dataclasses.dataclass(frozen=True)
+class Frontier:
+    """What a frontier found.
+
+    Attributes:
+        table: one row a controller. `relation` and `frontier` are to be read together: "=" the hardest value survived,
+            ">=" (or "<=" where smaller is harder) the end of the range was survived too, "<" (">") not even the easy
+            end was survived, "" not found yet. `low`, `high`: the bracket, adjacent tested values around the crossing,
+            NaN beyond the range; `low_rate`, `low_rate_from`, `low_rate_to`: survival at `low` with its 95 % interval,
+            likewise at `high`.
+        levels: one row a tested value and controller; `rate` with its 95 % interval `low`, `high`.
+        axis: what was varied.
+        survival: share of episodes to be survived.
+        folder: where everything is stored, if it is.
+        complete: False if the search was interrupted.
+    """
+
+    table: pd.DataFrame
+    levels: pd.DataFrame
+    axis: Axis
+    survival: float
+    folder: Path | None = None
+    complete: bool = True
+
+
+def value_text(row: Mapping[Any, Any], unit: str) -> str:
+    """A row's frontier with its relation and unit, e.g. ">= 60 N", or "open" if it was not found yet."""
+    if not row["relation"]:
+        return "open"
+    relation = "" if row["relation"] == "=" else f"{row['relation']} "
+    return f"{relation}{row['frontier']:g}{'' if unit == '1' else f' {unit}'}"

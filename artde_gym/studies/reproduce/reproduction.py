@@ -1,0 +1,154 @@
+"""The thesis' scenarios, run and judged claim by claim.
+
+Beside the thesis' controllers and their rivals, an ablation can be run: plain TDE at constant extra stiffness and
+damping (`tde+kd`), as much of it as ARTDE's robust gain c came to *in the same scenario*, on average over its episodes.
+What ARTDE is better than that, it owes to adaptation.
+
+    <out>/                       the folder of `evaluate`, all controllers but the ablation
+    <out>/ablation/<scenario>/   one of the ablation in each scenario, at a gain of its own
+    <out>/claims.csv             the claims with their verdicts
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.evaluation.evaluate import Update, evaluate
+from artde_gym.evaluation.result import Result
+from artde_gym.evaluation.store import write_atomically
+from artde_gym.scenarios import scenario as find_scenario
+from artde_gym.studies.reproduce.claims import CLAIMS, judge
+
+ADAPTIVE, ABLATION = "artde", "tde+kd"
+TRACED = 3  # episodes of each cell that leave their signals: to look at; compressing all takes a minute or two
+GAIN = "robust_gain_mean"  # column of a law's mean c; with a suffix for each loop of a cascade, as its gains have
+
+
+@dataclasses.dataclass(frozen=True)
+class Selection:
+    """Scenarios and controllers of one robot, by name."""
+
+    scenarios: tuple[str, ...]
+    controllers: tuple[str, ...]
+
+
+ROBOTS: dict[str, Selection] = {
+    "biped": Selection(
+        ("S1", "S2", "S3", "S1-L4", "S2-L4", "S3-L4", "S1-GRF"),
+        ("tde", "atde", ADAPTIVE),
+    ),
+    "quadrotor": Selection(
+        ("Q1", "Q1-calm", "Q1-gale"),
+        ("tde", "atde", ADAPTIVE, "asmc", "pid", "geometric", "indi"),
+    ),
+}
+"""What is run where nothing else is asked for."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Reproduction:
+    """Episodes of all controllers, and the claims with their verdicts (see `claims.judge`)."""
+
+    result: Result
+    claims: pd.DataFrame
+
+
+def scenarios_of(robot: str, names: Sequence[str] | None = None) -> tuple[str, ...]:
+    """Those of the named scenarios in which a robot moves; all that it is reproduced in for None.
+
+    Raises:
+        UnknownNameError: for an unknown robot or scenario.
+    """
+    if robot not in ROBOTS:
+        raise UnknownNameError("robot", robot, among(robot, ROBOTS))
+    own = ROBOTS[robot].scenarios
+    environments = {find_scenario(name).env_id for name in own}
+    return own if names is None else tuple(name for name in names if find_scenario(name).env_id in environments)
+
+
+def reproduce(
+    robot: str,
+    out: str | Path,
+    *,
+    scenarios: Sequence[str] | None = None,
+    controllers: Sequence[str] | None = None,
+    ablation: bool = False,
+    episodes: int = 10,
+    seed: int = 0,
+    workers: int = 1,
+    engine: str = "bullet",
+    on_progress: Callable[[str, Update], None] | None = None,
+) -> Reproduction:
+    """Run a robot's scenarios with all its controllers and judge the claims made in them.
+
+    Args:
+        robot: "biped" or "quadrotor".
+        out: folder to store everything in; the same call continues an interrupted one.
+        scenarios: of this robot, in place of `ROBOTS`' ones.
+        controllers: likewise, without the ablation.
+        ablation: whether to run it too; "artde" must be among the controllers then.
+        episodes: seeded episodes of each controller in each scenario.
+        seed: of everything.
+        workers: processes; the results do not depend on it.
+        engine: physics engine.
+        on_progress: called with what runs ("episodes", "ablation in S1") and the progress of its episodes.
+
+    Raises:
+        UnknownNameError, OptionError: for a bad argument, before the first episode.
+        StoreError: if `out` holds other results.
+    """
+    chosen = scenarios_of(robot, scenarios)
+    if not chosen:
+        raise OptionError("scenarios", scenarios, f"at least one of the {robot}'s")
+    names = list(ROBOTS[robot].controllers if controllers is None else controllers)
+    if ABLATION in names:
+        raise OptionError("controllers", ABLATION, "other names; it is run by ablation=True, at gains of its own")
+    if ablation and ADAPTIVE not in names:
+        raise OptionError("controllers", names, f"{ADAPTIVE!r} among them, from which the ablation takes its gain")
+    folder = Path(out)
+
+    def run(what: str, controllers: list[str], scenario: Sequence[str], where: Path, gains: Any = None) -> Result:
+        def report(update: Update) -> None:
+            if on_progress is not None:
+                on_progress(what, update)
+
+        return evaluate(
+            controllers,
+            scenario=scenario,
+            episodes=episodes,
+            seed=seed,
+            workers=workers,
+            out=where,
+            env_kwargs={"engine": engine},
+            gains=gains,
+            traced=TRACED,
+            on_progress=report,
+        )
+
+    result = run("episodes", names, chosen, folder)
+    if ablation:
+        for name in chosen:
+            if not result.complete:
+                break
+            gains = {ABLATION: equivalent_gains(result, name)}
+            part = run(f"ablation in {name}", [ABLATION], [name], folder / "ablation" / name, gains)
+            result = Result(pd.concat([result.episodes, part.episodes]), folder, part.complete)
+    made = [claim for claim in CLAIMS if claim.scenario in result.scenarios and (ablation or not claim.ablation)]
+    verdicts = judge(result, made)
+    text = verdicts.to_csv(index=False, lineterminator="\n")
+    write_atomically(folder / "claims.csv", lambda file: file.write(text.encode()))
+    return Reproduction(result, verdicts)
+
+
+def equivalent_gains(result: Result, scenario: str) -> dict[str, float]:
+    """The ablation's gains c (of a cascade c_p, c_q): means of ARTDE's over its episodes in a scenario."""
+    rows = result.rows(scenario, ADAPTIVE)
+    means = {column.removeprefix(GAIN): rows[column].to_numpy(np.float64) for column in rows if column.startswith(GAIN)}
+    return {f"c{suffix}": float(values.mean()) for suffix, values in means.items() if np.isfinite(values).all()}

@@ -1,0 +1,359 @@
+"""The cells of a sweep: what `sweep.yaml` says, checked and spread out.
+
+    scenario: S2                      # fixed: env, scenario, controller, gains, disturbances, env_kwargs, seed
+    env_kwargs: {duration: 6.0}
+    episodes: 20                      # of each cell; episode i has the seed that `evaluate` gives it
+    grid:                             # every combination of these values ...
+      controller: [tde, artde]
+      env_kwargs.control_period: [0.001, 0.004]
+    sample:                           # ... with each of so many random draws
+      draws: 50
+      vary:
+        gains.artde.gamma_0: {log_uniform: [50, 5000]}
+        disturbances.payload.mass: {uniform: [0.5, 2.0]}
+
+A path is one of the fixed names, or one value inside: `gains.<controller>.<gain>`, `env_kwargs.<argument>`,
+`disturbances.<kind>` or `disturbances.<kind>.<parameter>`. Cells that come out the same count once: gains of a
+controller that a cell does not run change nothing in it. Draw i depends on the seed, i and the path alone: more draws,
+or more paths, leave it as it was, and every combination of the grid meets the same draws.
+"""
+
+from __future__ import annotations
+
+import collections
+import dataclasses
+import hashlib
+import itertools
+import json
+import math
+import re
+import sys
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+
+from artde_gym.disturbances import KINDS
+from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.evaluation.environments import Backend
+from artde_gym.evaluation.evaluate import Cell, cells_of, identity_of
+from artde_gym.registration import ControllerSpec, registered_controllers
+from artde_gym.scenarios import scenario as find_scenario
+from artde_gym.studies.frontier.axis import placed
+
+SETTINGS: dict[str, Any] = {
+    "env": None,
+    "scenario": None,
+    "controller": None,
+    "gains": {},
+    "disturbances": None,
+    "env_kwargs": {},
+    "seed": 0,
+}
+"""What makes a cell, with its default; all of it as `evaluate` takes it, for one controller."""
+KEYS = (*SETTINGS, "episodes", "backend", "grid", "sample")
+INSIDE = ("gains.<controller>.<gain>", "disturbances.<kind>.<parameter>", "env_kwargs.<argument>")
+DISTRIBUTIONS = ("uniform", "log_uniform", "integers", "normal", "choice")
+MOST_CELLS = 100_000
+MOST_EPISODES = 2_000_000
+LARGEST = 1 << 20  # bytes of a file
+DEEPEST = 20  # levels of it
+
+
+@dataclasses.dataclass(frozen=True)
+class Point:
+    """One cell of a sweep.
+
+    Attributes:
+        cell: environment, arguments, disturbances.
+        controller: its name.
+        spec: what the name stands for.
+        gains: in place of its preset's.
+        seed: of the episodes, as `evaluate` takes it.
+        id: hash of everything that decides about its episodes.
+    """
+
+    cell: Cell
+    controller: str
+    spec: ControllerSpec
+    gains: dict[str, Any]
+    seed: int
+    id: str
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """What makes this cell as columns of a table; what is not given is left out."""
+        kwargs = dict(self.cell.kwargs)
+        disturbances = kwargs.pop("disturbances", None)
+        columns = {f"gains.{name}": _plain(value) for name, value in self.gains.items()}
+        columns |= {f"env_kwargs.{name}": _plain(value) for name, value in kwargs.items()}
+        columns["disturbances"] = None if disturbances is None else json.dumps(disturbances, sort_keys=True)
+        return {name: value for name, value in columns.items() if value is not None}
+
+
+@dataclasses.dataclass(frozen=True)
+class Design:
+    """A whole sweep: `episodes` of every point. `text` is what was read, as JSON."""
+
+    points: tuple[Point, ...]
+    episodes: int
+    backend: Backend
+    text: str
+
+
+def read(path: str | Path) -> dict[str, Any]:
+    """A sweep file as plain values; nothing in it is ever run.
+
+    Raises:
+        OptionError: if it cannot be read, or is no YAML mapping of plain values.
+    """
+    try:
+        import yaml
+    except ImportError as error:
+        raise OptionError("pyyaml", "not installed", "pip install 'artde-gym[sweep]'") from error
+
+    class Loader(yaml.SafeLoader):
+        """Safe, and without what makes a small file a large one (aliases) or loses values (a key given twice)."""
+
+        def compose_node(self, parent: Any, index: Any) -> Any:
+            if self.check_event(yaml.AliasEvent):
+                raise yaml.YAMLError("an alias (*name), which sweep files do without")
+            return super().compose_node(parent, index)
+
+        def construct_mapping(self, node: Any, deep: bool = False) -> Any:
+            keys = [(key.tag, key.value) for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
+            for (_, key), count in collections.Counter(keys).items():
+                if count > 1:
+                    raise yaml.YAMLError(f"the key {key!r} {count} times")
+            return super().construct_mapping(node, deep)
+
+    number = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+$")  # YAML 1.1 takes 1e-3 for a word
+    Loader.add_implicit_resolver("tag:yaml.org,2002:float", number, list("-+.0123456789"))
+    try:
+        data = Path(path).read_bytes()
+        if len(data) > LARGEST:
+            raise OptionError("sweep file", str(path), f"at most {LARGEST} bytes")
+        found = yaml.load(data.decode("utf-8"), Loader)
+    except (OSError, ValueError, TypeError, OverflowError, RecursionError, yaml.YAMLError) as error:
+        if isinstance(error, OptionError):
+            raise
+        raise OptionError("sweep file", str(path), f"a readable YAML file ({' '.join(str(error).split())})") from error
+    if not isinstance(found, dict):
+        raise OptionError("sweep file", str(path), f"a mapping with the keys {', '.join(KEYS)}")
+    return found
+
+
+def design(given: Mapping[str, Any]) -> Design:
+    """The cells of a sweep, from the content of its file.
+
+    Raises:
+        OptionError, UnknownNameError: for an unknown key, a wrong type, an unknown name, or too much of it all. What
+            environments and controllers themselves refuse is not asked here.
+    """
+    _check_plain("sweep", given)
+    for key in given:
+        if key not in KEYS:
+            raise OptionError("key of the sweep", key, among(key, KEYS))
+    episodes, backend = given.get("episodes", 1), given.get("backend", "single")
+    if not (_is_whole(episodes) and 1 <= episodes <= MOST_EPISODES):
+        raise OptionError("episodes", episodes, f"a whole number from 1 to {MOST_EPISODES}")
+    if backend not in get_args(Backend):
+        raise OptionError("backend", backend, among(backend, get_args(Backend)))
+    fixed = {**SETTINGS, **{name: value for name, value in given.items() if name in SETTINGS}}
+    for name, value in fixed.items():
+        _check_setting(name, value)
+    grid, draws = _grid(given.get("grid", {})), _draws(given.get("sample"), fixed["seed"])
+    for path, values in grid.items():
+        if path in draws[0]:
+            raise OptionError("path", path, "either in the grid or in the sample")
+        for value in values:
+            _check_at(path, value)
+    for draw in draws:
+        for path, value in draw.items():
+            _check_at(path, value)
+    count = math.prod(map(len, grid.values())) * len(draws)
+    if count > MOST_CELLS:
+        raise OptionError("sweep", f"{count} cells", f"at most {MOST_CELLS}")
+    names = {fixed["controller"], *grid.get("controller", ()), *(draw.get("controller") for draw in draws)}
+    points: dict[str, Point] = {}
+    for values in itertools.product(*grid.values()):
+        for draw in draws:
+            point = _point(_settings(fixed, {**dict(zip(grid, values, strict=True)), **draw}), backend, names)
+            points.setdefault(point.id, point)
+    if len(points) * episodes > MOST_EPISODES:
+        raise OptionError("sweep", f"{len(points) * episodes} episodes", f"at most {MOST_EPISODES}")
+    return Design(tuple(points.values()), episodes, backend, json.dumps(given))
+
+
+def _grid(given: Any) -> dict[str, list[Any]]:
+    if not isinstance(given, Mapping):
+        raise OptionError("grid", given, "a mapping of paths to lists of values")
+    for path, values in given.items():
+        _check_path(path)
+        if not (isinstance(values, list) and values):
+            raise OptionError(f"grid: {path}", values, "a list with at least one value")
+    return dict(given)
+
+
+def _draws(given: Any, seed: int) -> list[dict[str, Any]]:
+    """What each draw gives the paths that are sampled; one empty draw without a sample."""
+    if given is None:
+        return [{}]
+    if not (isinstance(given, Mapping) and given.keys() == {"draws", "vary"} and isinstance(given["vary"], Mapping)):
+        raise OptionError("sample", given, "a mapping with `draws` and `vary`, a mapping of paths to distributions")
+    draws, vary = given["draws"], given["vary"]
+    if not (_is_whole(draws) and 1 <= draws <= MOST_CELLS):
+        raise OptionError("sample: draws", draws, f"a whole number from 1 to {MOST_CELLS}")
+    for path, distribution in vary.items():
+        _check_path(path)
+        _check_distribution(f"sample: {path}", distribution)
+    return [{path: _draw(path, distribution, seed, i) for path, distribution in vary.items()} for i in range(draws)]
+
+
+def _check_distribution(field: str, given: Any) -> None:
+    if not (isinstance(given, Mapping) and len(given) == 1 and next(iter(given)) in DISTRIBUTIONS):
+        raise OptionError(field, given, f"a mapping of one of {', '.join(DISTRIBUTIONS)} to a list")
+    ((kind, arguments),) = given.items()
+    field = f"{field}.{kind}"
+    if kind == "choice":
+        if not (isinstance(arguments, list) and arguments):
+            raise OptionError(field, arguments, "a list with at least one value")
+        return
+    good = _is_whole if kind == "integers" else _is_number
+    if not (isinstance(arguments, list) and len(arguments) == 2 and all(map(good, arguments))):
+        raise OptionError(field, arguments, f"two {'whole ' * (kind == 'integers')}numbers")
+    first, second = arguments
+    if kind == "normal" and second < 0:
+        raise OptionError(field, arguments, "a mean and a standard deviation >= 0")
+    if kind != "normal" and not (first <= second and math.isfinite(float(second) - float(first))):
+        raise OptionError(field, arguments, "two numbers, the lower one first")
+    if kind == "log_uniform" and first <= 0:
+        raise OptionError(field, arguments, "two numbers above zero")
+    if kind == "integers" and max(map(abs, arguments)) >= 2**62:
+        raise OptionError(field, arguments, "whole numbers below 2^62")
+
+
+def _draw(path: str, distribution: Mapping[str, list[Any]], seed: int, number: int) -> Any:
+    ((kind, arguments),) = distribution.items()
+    rng = np.random.default_rng(np.random.SeedSequence([seed, number, zlib.crc32(path.encode())]))
+    if kind == "choice":
+        return arguments[int(rng.integers(len(arguments)))]
+    first, second = arguments
+    if kind == "integers":
+        return int(rng.integers(first, second, endpoint=True))
+    if kind == "normal":
+        return float(rng.normal(first, second))
+    if kind == "uniform":
+        return float(rng.uniform(first, second))
+    return min(max(math.exp(rng.uniform(math.log(first), math.log(second))), first), second)
+
+
+def _settings(fixed: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings of one cell: the fixed ones, whole ones in their place, then single values inside."""
+    settings = dict(fixed)
+    settings |= {path: value for path, value in values.items() if path in SETTINGS}
+    for path, value in values.items():
+        head, _, rest = path.partition(".")
+        if path in SETTINGS:
+            continue
+        if head == "gains":
+            name, _, gain = rest.rpartition(".")
+            settings["gains"] = {**settings["gains"], name: {**settings["gains"].get(name, {}), gain: value}}
+        elif head == "env_kwargs":
+            settings["env_kwargs"] = {**settings["env_kwargs"], rest: value}
+        else:
+            settings["disturbances"] = _disturbed(settings, path, rest, value)
+    return settings
+
+
+def _disturbed(settings: Mapping[str, Any], path: str, inside: str, value: Any) -> dict[str, Any]:
+    given = settings["disturbances"]
+    if given is None:
+        if settings["scenario"] is None:
+            allowed = "with a scenario, or with disturbances to change ({} if there are no others)"
+            raise OptionError("path", path, allowed)
+        given = find_scenario(settings["scenario"]).disturbances
+    kind, _, parameter = inside.partition(".")
+    if kind not in KINDS:
+        raise UnknownNameError("disturbance", kind, among(kind, KINDS))
+    if not parameter:
+        return {**given, kind: value}
+    names = [known.name for known in KINDS[kind].parameters]
+    if parameter not in names:
+        raise UnknownNameError(f"parameter of {kind}", parameter, among(parameter, names))
+    return placed(given, kind, parameter, value)
+
+
+def _point(settings: Mapping[str, Any], backend: Backend, names: set[Any]) -> Point:
+    known, controller = registered_controllers(), settings["controller"]
+    if controller not in known:
+        raise UnknownNameError("controller", controller, among(controller, known))
+    for name in settings["gains"]:
+        if name not in names:
+            raise UnknownNameError("gains", name, among(name, [str(one) for one in names if one is not None]))
+    (cell,) = cells_of(settings["env"], settings["scenario"], settings["env_kwargs"], settings["disturbances"])
+    gains, seed, spec = settings["gains"].get(controller, {}), settings["seed"], known[controller]
+    decides = [*cell, controller, identity_of(spec), gains, seed, backend]
+    digest = hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
+    return Point(cell, controller, spec, gains, seed, digest[:16])
+
+
+def _check_path(path: str) -> None:
+    head, _, rest = path.partition(".")
+    depth = {"gains": 2, "env_kwargs": 1, "disturbances": 1}.get(head, 0)
+    if path not in SETTINGS and not (depth and rest.count(".") >= depth - 1 and all(path.split("."))):
+        raise UnknownNameError("path", path, among(path, [*SETTINGS, *INSIDE]))
+
+
+def _check_at(path: str, value: Any) -> None:
+    """What a path gets; values inside a setting are for those to check who know them."""
+    if path in SETTINGS:
+        _check_setting(path, value)
+
+
+def _check_setting(name: str, value: Any) -> None:
+    if name in ("env", "scenario", "controller"):
+        good, allowed = value is None or isinstance(value, str), "a name"
+    elif name == "seed":
+        good, allowed = _is_whole(value) and value >= 0, "a whole number >= 0"
+    elif name == "gains":
+        good = isinstance(value, Mapping) and all(isinstance(gains, Mapping) for gains in value.values())
+        allowed = "a mapping of controllers to mappings of their gains"
+    else:
+        good = isinstance(value, Mapping) or (name == "disturbances" and value is None)
+        allowed = "a mapping"
+    if not good:
+        raise OptionError(name, value, allowed)
+
+
+def _check_plain(field: str, value: Any, depth: int = 0) -> None:
+    """Only what JSON can write, so that nothing else ever gets into an environment or a file."""
+    if depth > DEEPEST:
+        raise OptionError(field, "...", f"at most {DEEPEST} levels")
+    if isinstance(value, Mapping):
+        for key, item in value.items():
+            if not isinstance(key, str):
+                raise OptionError(f"key of {field}", key, "a word")
+            _check_plain(f"{field}: {key}", item, depth + 1)
+    elif isinstance(value, list):
+        for i, item in enumerate(value):
+            _check_plain(f"{field}[{i}]", item, depth + 1)
+    elif not (value is None or isinstance(value, (str, bool)) or _is_number(value)):
+        raise OptionError(field, value, "finite numbers, words, true, false, null, lists and mappings")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
+
+
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def _plain(value: Any) -> Any:
+    """A value as a column holds it: numbers as float64, lists and mappings as JSON."""
+    if isinstance(value, (list, dict)):
+        return json.dumps(value, sort_keys=True)
+    return value

@@ -1,0 +1,211 @@
+"""Sweeps: any number of cells in seeded episodes, on any number of processes or machines, into one Parquet dataset.
+
+An episode is exactly that of `evaluate` with the same arguments, seed and number, to the last bit; where it runs, in
+which order and after how many interruptions makes no difference.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import pandas as pd
+
+from artde_gym.errors import ArtdeGymError, OptionError, StoreError, among
+from artde_gym.evaluation.evaluate import (
+    CHUNK,
+    Task,
+    Update,
+    chunks_of,
+    duration_of,
+    episode_seed,
+    labels_of,
+    policy_for,
+    run_task,
+    tried,
+)
+from artde_gym.evaluation.rollout import Episode
+from artde_gym.evaluation.workers import Runs, run_here, run_parallel
+from artde_gym.studies.sweep import parquet
+from artde_gym.studies.sweep.design import Design, Point, design, read
+from artde_gym.studies.sweep.ray_workers import run_on_ray
+from artde_gym.studies.sweep.store import Key, SweepStore, read_sweep
+
+Executor = Literal["local", "ray"]
+"""Processes of this machine, or a Ray cluster."""
+
+TRACE_HZ = 100.0
+"""`evaluate` has it where nothing else is asked for; policies are asked for what some metrics need at this rate."""
+
+OnProgress = Callable[[str, Update], None]
+
+
+@dataclasses.dataclass(frozen=True)
+class Sweep:
+    """What a sweep has found so far.
+
+    Attributes:
+        episodes: one row each, as of `read_sweep`.
+        folder: where they are stored.
+        complete: False after an interruption.
+        set_aside: files in the folder's `corrupt` that this run found not as they had been written.
+    """
+
+    episodes: pd.DataFrame
+    folder: Path
+    complete: bool
+    set_aside: tuple[str, ...] = ()
+
+
+def sweep(
+    given: str | Path | Mapping[str, Any],
+    out: str | Path,
+    *,
+    workers: int = 1,
+    executor: Executor = "local",
+    address: str | None = None,
+    on_progress: OnProgress | None = None,
+) -> Sweep:
+    """Run all episodes of a sweep that its folder does not hold yet.
+
+    Args:
+        given: a YAML file, or its content as plain values; see `artde_gym.studies.sweep.design`.
+        out: folder of the results, see `artde_gym.studies.sweep.store`. The same call continues after whatever
+            happened; a sweep that has more episodes than the folder adds the others.
+        workers: processes; the results do not depend on it.
+        executor: "local", or "ray" for a Ray cluster, which its workers share.
+        address: of a running Ray cluster, "auto" for this machine's; None starts one here with so many workers.
+        on_progress: called with what goes on ("cells checked", "episodes") and how far it is.
+
+    Returns:
+        What there is; `complete` is False after an interruption (Ctrl-C), with all finished episodes in it.
+
+    Raises:
+        UnknownNameError, OptionError, DisturbanceError, GainError: for a bad cell, before the first episode.
+        StoreError: if `out` holds anything else, is used by another process, or cannot be written (a full disk).
+        WorkerError: if workers keep ending before their episodes do.
+    """
+    if not (isinstance(workers, int) and workers >= 1):
+        raise OptionError("workers", workers, "a whole number >= 1")
+    if executor not in get_args(Executor):
+        allowed = f"{among(executor, get_args(Executor))}; a physics engine is an argument of environments (env_kwargs)"
+        raise OptionError("executor", executor, allowed)
+    if address is not None and executor != "ray":
+        raise OptionError("address", address, "none without executor 'ray'")
+    parquet.pyarrow()
+    plan = design(read(given) if isinstance(given, (str, Path)) else given)
+    types = parquet.types_of(point.columns for point in plan.points)
+    points = {f"{point.cell.name} [{i}]": point for i, point in enumerate(plan.points)}
+    report = on_progress or (lambda *_: None)
+    complete = True
+    with SweepStore(Path(out)) as store:
+        _refuse_others(plan, store)
+        _check(plan, points, store.done, report)
+        store.begin(plan.text, types)
+        total = len(points) * plan.episodes
+        finished = len(store.done)
+
+        def on_time(task: Task, time: float) -> None:
+            store.due()
+            report("episodes", Update(task, time, False, finished, total))
+
+        if finished < total:
+            runs = _runs(_tasks(plan, points, store.done), workers, executor, address, on_time, store.due)
+            try:
+                for task, results in runs:
+                    store.add(_rows(points[task.cell.name], task, results))
+                    finished += len(results)
+                    report("episodes", Update(task, duration_of(results), True, finished, total))
+            except KeyboardInterrupt:
+                complete = False
+            finally:
+                runs.close()
+        if complete:
+            store.finish()
+    return Sweep(read_sweep(out), Path(out), complete, tuple(path.name for path in store.set_aside))
+
+
+def _runs(
+    tasks: Iterator[Task],
+    workers: int,
+    executor: Executor,
+    address: str | None,
+    on_time: Callable[[Task, float], None],
+    on_wait: Callable[[], None],
+) -> Runs:
+    if executor == "ray":
+        return run_on_ray(_run, tasks, workers, address, on_wait)
+    return run_here(_run, tasks, on_time) if workers == 1 else run_parallel(_run, tasks, workers, on_time)
+
+
+def _run(task: Task, on_time: Callable[[float], None]) -> list[Episode]:
+    """Run a task; what goes wrong in one of many cells is told with the cell."""
+    try:
+        return run_task(task, on_time)
+    except ArtdeGymError as error:
+        cell = f"{task.controller} with {task.gains}, {task.cell.env_id} with {task.cell.kwargs}, seeds {task.seeds}"
+        raise type(error)(f"{error.field} ({cell})", error.value, error.allowed) from error
+
+
+def _refuse_others(plan: Design, store: SweepStore) -> None:
+    """A folder holds no episodes but those of its sweep, so that whoever reads it need not ask which are meant."""
+    cells = {point.id for point in plan.points}
+    others = sum(cell not in cells or episode >= plan.episodes for cell, episode in store.done)
+    if others:
+        allowed = (
+            f"a new folder, or a sweep with all episodes that this one holds: {others} of {len(store.done)} belong to "
+            "another one"
+        )
+        raise StoreError("sweep folder", str(store.folder), allowed)
+
+
+def _check(plan: Design, points: Mapping[str, Point], done: set[Key], report: OnProgress) -> None:
+    """Build everything once, so that a bad cell shows before the first episode; cells with episodes have been tried."""
+    begun = {cell for cell, _ in done}
+    fresh = [(name, point) for name, point in points.items() if point.id not in begun]
+    fresh.sort(key=lambda item: _place(item[1]))  # neighbours share an environment
+    last, env = None, None
+    for i, (name, point) in enumerate(fresh, start=1):
+        if _place(point) != last:
+            last, env = _place(point), tried(plan.backend, point.cell)
+        policy_for(point.spec, env, point.gains)
+        report("cells checked", Update(_task(plan, name, point, [0]), 0.0, True, i, len(fresh)))
+
+
+def _place(point: Point) -> tuple[str, str, str]:
+    """Environment, arguments, disturbances."""
+    kwargs = dict(point.cell.kwargs)
+    disturbances = kwargs.pop("disturbances", None)
+    return point.cell.env_id, json.dumps(kwargs), json.dumps(disturbances)
+
+
+def _tasks(plan: Design, points: Mapping[str, Point], done: set[Key]) -> Iterator[Task]:
+    """What is left to run, episode by episode, so that an interruption leaves whole comparisons behind."""
+    for chunk in chunks_of(plan.episodes, 1 if plan.backend == "single" else CHUNK):
+        for name, point in points.items():
+            left = [episode for episode in chunk if (point.id, episode) not in done]
+            if left:
+                yield _task(plan, name, point, left)
+
+
+def _task(plan: Design, name: str, point: Point, episodes: list[int]) -> Task:
+    return Task(
+        plan.backend,
+        point.cell._replace(name=name),
+        point.controller,
+        point.spec,
+        point.gains,
+        episodes,
+        [episode_seed(point.seed, episode) for episode in episodes],
+        TRACE_HZ,
+        traced=0,
+    )
+
+
+def _rows(point: Point, task: Task, results: list[Episode]) -> Iterator[dict[str, Any]]:
+    for i, result in enumerate(results):
+        labels = {**labels_of(task, i), "cell": point.id, "scenario": point.cell.name}
+        yield {**labels, **point.columns, **result.row}
