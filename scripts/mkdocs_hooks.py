@@ -12,7 +12,7 @@ from documentation.notebooks import NOTEBOOKS, notebook
 from documentation.pages import ROOT, cards, generated
 from mkdocs.structure.files import File
 
-CHART_STYLE = ROOT / "artde_gym/evaluation/report/assets/chart.css"
+CHART_STYLE = ROOT / "artde_gym/report/assets/chart.css"
 
 _symbols: set[int] = set()
 
