@@ -90,3 +90,17 @@ def reading(field: str, path: Path, allowed: str, kind: type[ArtdeGymError]) -> 
         raise
     except Exception as error:
         raise kind(field, str(path), f"{allowed} ({type(error).__name__}: {error})") from error
+
+
+def steps_per_period(control_period: float, step: float) -> int:
+    """How many steps of `step` (s) make a control period.
+
+    Raises:
+        OptionError: unless it is a whole number, and the period 0.05 s at most.
+    """
+    allowed = f"whole multiples of {step} s up to 0.05 s"
+    period = number("control_period", control_period, 0.0, 0.05 + 0.5 * step, allowed)
+    steps = round(period / step)
+    if not (1 <= steps <= round(0.05 / step) and math.isclose(steps * step, period, rel_tol=1e-9)):
+        raise OptionError("control_period", control_period, allowed)
+    return steps

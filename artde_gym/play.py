@@ -10,13 +10,13 @@ from typing import Any, Protocol
 import numpy as np
 
 from artde_gym.evaluation.rollout import Policy
-from artde_gym.robots.spec import Vector
+from artde_gym.kit import ROBOTS, Push
+from artde_gym.multibody.spec import Vector
 from artde_gym.sim.camera import Camera
 from artde_gym.sim.engine import State
 
 RATE = 30.0  # looks at the keys in a second
-PUSHES = {"ojas": ("chest", 20.0), "q450": ("body", 3.0)}
-"""Robot -> the site that keys push at, and how hard (N) in the beginning."""
+FORCE = 10.0  # N, of a push in the beginning where the robot does not say
 DURATION = 0.2  # s, of a push
 HARDER = 1.25  # by a key
 SLOWER = 2.0  # by a key
@@ -74,8 +74,8 @@ class Session:
     def __init__(self, env: Any, policy: Policy, window: Viewer, name: str, seed: int = 0) -> None:
         self._env, self._plant, self._policy, self._window, self._name = env, env.unwrapped, policy, window, name
         self._seed = seed
-        self.site, self.force = PUSHES[self._plant.robot_name]
         self._sites: list[str] = [site for site, _, _ in self._plant.nominal_robot.sites]
+        self.site, self.force = ROBOTS[self._plant.robot_name].push or Push(self._sites[0], FORCE)
         self.speed, self.paused, self.leaving = 1.0, False, False
         self._actions: dict[str, Callable[[], object]] = {
             "d": self._plant.drop_payload,

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import gymnasium as gym
 
 from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.kit import ROBOTS
 
 
 @dataclasses.dataclass(frozen=True)
@@ -116,22 +117,10 @@ def resolved(entry_point: str) -> Callable[..., Any]:
 
 
 def register_all() -> None:
-    """Register what this project brings; called once, by `import artde_gym`."""
-    gym.register(
-        id="BipedWalk-Payload-v0",
-        entry_point="artde_gym.envs.biped_walk:BipedWalkPayloadEnv",
-        vector_entry_point="artde_gym.envs.biped_walk:BipedWalkPayloadVectorEnv",
-    )
-    gym.register(
-        id="BipedPush-v0",
-        entry_point="artde_gym.envs.biped_push:BipedPushEnv",
-        vector_entry_point="artde_gym.envs.biped_push:BipedPushVectorEnv",
-    )
-    gym.register(
-        id="QuadInfinity-Payload-v0",
-        entry_point="artde_gym.envs.quadrotor:QuadInfinityPayloadEnv",
-        vector_entry_point="artde_gym.envs.quadrotor_batch:QuadInfinityPayloadVectorEnv",
-    )
+    """Register what all robots and this project bring; called once, by `import artde_gym`."""
+    for kit in ROBOTS.values():
+        for entry in kit.environments:
+            gym.register(id=entry.env_id, entry_point=entry.entry_point, vector_entry_point=entry.vector_entry_point)
     register_laws()
 
 

@@ -1,33 +1,16 @@
-"""Named scenarios: an environment, its arguments and what happens in it, fixed on physical grounds.
+"""Named scenarios: an environment, its arguments and its disturbances, fixed on physical grounds.
 
-Every scenario varies from seed to seed, so that a result is a rate and not a single trajectory. Biped: a kick on the
-torso of 0.5 to 5 N for 0.2 s at 1 s from any side, friction of 0.7 to 0.9, and a payload up to 1 cm off its place.
-Quadrotor: the air, a payload within 5 % of its mass and 5 mm of its place (as it is weighed and gripped), and a start
-within 5 mm of the path (as a vehicle hovers there).
+Each robot brings its own, see `artde_gym.robots`. Every scenario varies from seed to seed, so that a result is a rate
+and not a single trajectory.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from typing import Any
 
-from artde_gym.disturbances.pushes import ARM_PUSH, CHEST_PUSH
-from artde_gym.errors import UnknownNameError, among
-
-_KICK = {
-    "body": "torso",
-    "magnitude": {"uniform": [0.5, 5.0]},
-    "direction": [{"normal": [0.0, 1.0]}, {"normal": [0.0, 1.0]}, 0.0],
-    "start": 1.0,
-    "duration": 0.2,
-}
-_VARIATION: dict[str, Any] = {"push": [_KICK], "friction": {"uniform": [0.7, 0.9]}}
-_PAYLOAD: dict[str, Any] = {
-    "mass": 1.3,
-    "position": [{"uniform": [-0.01, 0.01]}, {"uniform": [-0.01, 0.01]}, {"uniform": [0.15, 0.17]}],
-}
+from artde_gym.registry import Registry
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,49 +31,25 @@ class Scenario:
     phases: tuple[tuple[float, float], ...] = ()
 
 
-_LOAD: dict[str, Any] = {
-    "mass": {"uniform": [0.95 * 0.35, 1.05 * 0.35]},
-    "position": [{"uniform": [0.005, 0.015]}, {"uniform": [-0.005, 0.005]}, {"uniform": [-0.105, -0.095]}],
-    "drop": 35.0,
-}
-_FLIGHT: dict[str, Any] = {
-    "payload": _LOAD,
-    "ground_effect": 1.0,
-    "initial_position": {"offset": [{"uniform": [-0.005, 0.005]}] * 3},
-}
-
-_WALK = "BipedWalk-Payload-v0"
-_PUSH = "BipedPush-v0"
-_INFINITY = "QuadInfinity-Payload-v0"
-_SLOW = {"control_period": 0.004}
-_S2 = {"payload": _PAYLOAD, **_VARIATION}
-_S3 = {**_S2, "push": [_KICK, CHEST_PUSH, ARM_PUSH]}
-_GRF = {**_VARIATION, "grf_pulse": 60.0}
-_PHASES = ((0.0, 28.0), (28.0, 37.0), (37.0, math.inf))
-
-SCENARIOS: dict[str, Scenario] = {
-    entry.name: entry
-    for entry in (
-        Scenario("S1", _WALK, {}, _VARIATION, "walk without payload, L = 1 ms", "S1"),
-        Scenario("S2", _WALK, {}, _S2, "walk with a payload of 1.3 kg, L = 1 ms", "S2"),
-        Scenario("S3", _PUSH, {}, _S3, "S2 with pushes of 10 N at 28 s (chest) and 37 s (left arm)", "S3", _PHASES),
-        Scenario("S1-L4", _WALK, _SLOW, _VARIATION, "S1 at L = 4 ms: a quarter of the joint stiffness", "S1"),
-        Scenario("S2-L4", _WALK, _SLOW, _S2, "S2 at L = 4 ms", "S2"),
-        Scenario("S3-L4", _PUSH, _SLOW, _S3, "S3 at L = 4 ms", "S3", _PHASES),
-        Scenario("S1-GRF", _WALK, {}, _GRF, "S1 with the thesis' extra ground force", "S1"),
-        Scenario("Q1", _INFINITY, {}, {**_FLIGHT, "wind": 1.0}, "infinity loops with a payload of 0.35 kg, wind", "Q1"),
-        Scenario("Q1-calm", _INFINITY, {}, _FLIGHT, "Q1 without wind"),
-        Scenario("Q1-gale", _INFINITY, {}, {**_FLIGHT, "wind": 2.0}, "Q1 in wind of twice the strength", "Q1"),
-    )
-}
+SCENARIOS: Registry[Scenario] = Registry(
+    "scenario", "artde_gym.robots", lambda kit: {entry.name: entry for entry in kit.scenarios}
+)
+"""All scenarios by name: those of every robot, and those registered."""
 
 
 def scenario(name: str) -> Scenario:
-    """The scenario called `name`.
+    """Return the scenario called `name`.
 
     Raises:
         UnknownNameError: if there is none.
     """
-    if not isinstance(name, str) or name not in SCENARIOS:
-        raise UnknownNameError("scenario", name, among(name, SCENARIOS))
-    return SCENARIOS[name]
+    return SCENARIOS.find(name)
+
+
+def register_scenario(entry: Scenario, *, replace: bool = False) -> None:
+    """Make a scenario known to `evaluate`, to `reset(options={"scenario": ...})` and to the command line.
+
+    Raises:
+        OptionError: if its name is taken and `replace` is not given.
+    """
+    SCENARIOS.register(entry.name, entry, replace=replace)

@@ -1,6 +1,6 @@
 """Kinematics of Ojas' legs as an agent needs them: mirror symmetry, ankles from joints and joints from ankles.
 
-Joint vectors are (..., 12), left leg then right leg, each q1..q6; see `artde_gym.robots.ojas`.
+Joint vectors are (..., 12), left leg then right leg, each q1..q6; see `artde_gym.robots.ojas.model`.
 """
 
 from __future__ import annotations
@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from artde_gym.layout import Layout
-from artde_gym.robots import ojas as robot
-from artde_gym.robots.leg_ik import leg_angles
+from artde_gym.robots.ojas import model as robot
+from artde_gym.robots.ojas.leg_ik import leg_angles
 from controllers.laws.tracking import Array
 
 JOINTS = 12

@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, get_args
 
-from artde_gym.envs import biped_task, quadrotor_task
 from artde_gym.errors import ArtdeGymError, OptionError, UnknownNameError, among
-from artde_gym.robots.ojas import ActuatorInertia, ojas
-from artde_gym.robots.q450 import q450
-from artde_gym.robots.spec import RobotSpec
+from artde_gym.multibody.spec import RobotSpec
+from artde_gym.robots.ojas import task as biped_task
+from artde_gym.robots.ojas.model import ActuatorInertia, ojas
+from artde_gym.robots.q450 import task as quadrotor_task
+from artde_gym.robots.q450.model import q450
 from baselines.errors import PolicyFileError
 from baselines.policy_file import DESCRIPTION, Saved, layout_hash, read
 from baselines.residual import Residual, ResidualPolicy

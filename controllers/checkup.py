@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artde_gym.doctor.outcome import Outcome
-from artde_gym.references.walking import walking_pattern
-from artde_gym.robots.dynamics import RigidBodyTree, joint_space_inertia
-from artde_gym.robots.ojas import ActuatorInertia, ojas
-from artde_gym.robots.q450 import q450
+from artde_gym.multibody.dynamics import RigidBodyTree, joint_space_inertia
+from artde_gym.robots.ojas.model import ActuatorInertia, ojas
+from artde_gym.robots.ojas.walking import walking_pattern
+from artde_gym.robots.q450.model import q450
 from controllers.laws.validity import tde_eigenvalues, tde_is_valid
 from controllers.presets import PRESETS, named_gains
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from artde_gym.multibody.support import Supported
 from artde_gym.registration import GainRange
-from artde_gym.robots.support import Supported
 from controllers.law_table import Nothing
 from controllers.laws.computed_torque import ComputedTorqueGains, computed_torque
 from controllers.laws.tracking import Array, Memory, Signals

@@ -12,13 +12,11 @@ import numpy as np
 
 from artde_gym.cli.arguments import ENGINES
 from artde_gym.disturbances import KINDS
-from artde_gym.disturbances.kinds import ALL, allowed
+from artde_gym.disturbances.kinds import ALL, allowed, other_defaults
 from artde_gym.evaluation.environments import arguments_of, ours, robot_of
+from artde_gym.kit import ROBOTS
 from artde_gym.registration import registered_controllers
-from artde_gym.robots.ojas import ojas
-from artde_gym.robots.q450 import ROTORS, q450
 from artde_gym.scenarios import SCENARIOS
-from artde_gym.studies.frontier.standard import STANDARDS
 from controllers.presets import LOOPS, PRESETS, named_gains
 from controllers.presets.units import unit_of
 
@@ -100,7 +98,7 @@ def disturbances() -> Entries:
         {
             "name": kind.name,
             "text": kind.text,
-            "robots": list(kind.robots),
+            "robots": [robot for robot in ROBOTS if kind.honored_by(robot)],
             "list": kind.repeated,
             "bare_number": kind.scalar,
             "words": {
@@ -109,7 +107,8 @@ def disturbances() -> Entries:
                     for parameter in kind.parameters
                     if parameter.size == 0
                 }
-                for robot in kind.robots
+                for robot in ROBOTS
+                if kind.honored_by(robot)
             },
             "parameters": [
                 {
@@ -118,7 +117,9 @@ def disturbances() -> Entries:
                     "allowed": allowed(parameter),
                     "required": parameter.default is None,
                     "default": _plain(parameter.default),
-                    "other_defaults": {robot: _plain(value) for robot, value in parameter.other_defaults.items()},
+                    "other_defaults": {
+                        robot: _plain(value) for robot, value in other_defaults(kind, parameter).items()
+                    },
                     "text": parameter.text,
                 }
                 for parameter in kind.parameters
@@ -132,8 +133,9 @@ def frontiers() -> Entries:
     """Every path that a frontier varies within a range of its own."""
     return [
         {"name": path, "robot": robot, **values._asdict()}
-        for robot, standard in STANDARDS.items()
-        for path, values in standard.ranges.items()
+        for robot, kit in ROBOTS.items()
+        if kit.frontier is not None
+        for path, values in kit.frontier.ranges.items()
     ]
 
 
@@ -141,8 +143,8 @@ def _words(words: tuple[str, ...] | str, robot: str) -> list[str]:
     """What a word may be: places and joints are the robot's."""
     if not isinstance(words, str):
         return list(words)
-    spec = ojas() if robot == "ojas" else q450()
-    return [name for name, _, _ in spec.sites] if words == "site" else [*(spec.actuated or ROTORS), ALL]
+    kit = ROBOTS[robot]
+    return list(kit.sites) if words == "site" else [*kit.joints, ALL]
 
 
 TOPICS: dict[str, Callable[[], Entries]] = {

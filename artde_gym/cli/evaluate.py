@@ -32,9 +32,7 @@ from artde_gym.cli.display import Display
 from artde_gym.cli.report import show_report
 from artde_gym.evaluation import evaluate as run_evaluation
 from artde_gym.evaluation.console import print_result
-
-MAIN_SCENARIOS = {WALK: "S1,S2,S1-L4,S2-L4", "QuadInfinity-Payload-v0": "Q1,Q1-calm,Q1-gale"}
-"""What is run in an environment where no scenario is named."""
+from artde_gym.evaluation.environments import main_scenarios
 
 
 def evaluate(
@@ -66,7 +64,7 @@ def evaluate(
     """Compare controllers on the same seeded episodes and print them beside the thesis."""
     if scenario is None:
         env = env or WALK
-        scenario = MAIN_SCENARIOS.get(env)
+        scenario = ",".join(main_scenarios(env)) or None
         if scenario is not None and backend == "batch":
             scenario = scenario.split(",")[0]
     kwargs = environment_kwargs(env_kwargs, engine)

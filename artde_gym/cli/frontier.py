@@ -27,11 +27,11 @@ from artde_gym.cli.arguments import (
 )
 from artde_gym.cli.display import Display
 from artde_gym.cli.report import show_report
+from artde_gym.kit import ROBOTS
 from artde_gym.studies import frontier as run_frontier
 from artde_gym.studies.frontier.console import print_frontier
-from artde_gym.studies.frontier.standard import STANDARDS
 
-VARIED = dict.fromkeys(path for standard in STANDARDS.values() for path in standard.ranges)
+VARIED = dict.fromkeys(path for kit in ROBOTS.values() if kit.frontier for path in kit.frontier.ranges)
 
 
 def frontier(

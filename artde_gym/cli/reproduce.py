@@ -15,11 +15,11 @@ from artde_gym.cli.report import show_report
 from artde_gym.evaluation.console import print_claims, print_result
 from artde_gym.studies import reproduce as run_reproduction
 from artde_gym.studies.reproduce.claims import confirm
-from artde_gym.studies.reproduce.reproduction import ROBOTS, scenarios_of
+from artde_gym.studies.reproduce.reproduction import scenarios_of, titles
 
 
 def reproduce(
-    robot: Annotated[str, typer.Option(help=f"{', '.join(ROBOTS)}, or all.")] = "all",
+    robot: Annotated[str, typer.Option(help=f"{', '.join(titles())}, or all.")] = "all",
     engine: Annotated[str, typer.Option(help=f"Physics engine: {', '.join(ENGINES)}, or both.")] = "bullet",
     episodes: Annotated[int, typer.Option(help="Seeded episodes of each controller in each scenario.")] = 10,
     scenario: Annotated[str | None, typer.Option(help="Names, comma-separated. Default: all of the robot.")] = None,
@@ -37,7 +37,7 @@ def reproduce(
     videos: Videos = False,
 ) -> None:
     """Run the thesis' scenarios and print its tables beside ours, then each of its claims with a verdict."""
-    robots = list(ROBOTS) if robot == "all" else [robot]
+    robots = titles() if robot == "all" else [robot]
     engines = list(ENGINES) if engine == "both" else [engine]
     named = None if scenario is None else names(scenario)
     console = Console()

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from artde_gym.arrays import Array
-from artde_gym.robots.lag import follow, lag_shares
+from artde_gym.multibody.lag import follow, lag_shares
 
 
 class Actuation:

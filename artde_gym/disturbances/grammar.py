@@ -49,7 +49,7 @@ class Disturbances:
             given: as a user wrote it.
             sites: of the robot, to be pushed at.
             joints: of the robot, or its rotors.
-            robot: one of `artde_gym.disturbances.kinds.ROBOTS`, for its kinds and defaults; without, any kind is read.
+            robot: one of `artde_gym.kit.ROBOTS`, for its kinds and defaults; without, any kind is read.
 
         Raises:
             DisturbanceError: for an unknown kind, key or site, a kind that the robot does not honour, a wrong type, a
@@ -59,7 +59,7 @@ class Disturbances:
             return cls()
         if not isinstance(given, Mapping):
             raise DisturbanceError("disturbances", given, "a mapping of kinds to their parameters")
-        honoured = [kind.name for kind in KINDS.values() if robot is None or robot in kind.robots]
+        honoured = [kind.name for kind in KINDS.values() if kind.honored_by(robot)]
         for name in given:
             if name not in honoured:
                 of_robot = f"{robot} honours " if name in KINDS else ""
@@ -127,7 +127,7 @@ def _parse_entry(
         field = f"{path}.{name}"
         if name not in given and parameter.default is None:
             raise DisturbanceError(field, None, f"{allowed(parameter)} (it has no default)")
-        value = given.get(name, parameter.default_of(robot))
+        value = given.get(name, kind.default_of(parameter, robot))
         entry[name] = _word(value, parameter, field, words) if parameter.size == 0 else _check(value, parameter, field)
     return entry
 

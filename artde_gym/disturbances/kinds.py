@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
 from typing import Any
 
-ROBOTS = ("ojas", "q450")
+from artde_gym.kit import ROBOTS, Capability
 
 
 @dataclasses.dataclass(frozen=True)
@@ -16,7 +15,6 @@ class Parameter:
     Attributes:
         low, high: allowed range of each component.
         default: used where the parameter is left out; None if it must be given.
-        other_defaults: defaults of robots that need another one, by robot.
         size: number of components; 0 for a word.
         nonzero: whether a vector of zeros is refused.
         integer: whether the value is a whole number.
@@ -33,26 +31,33 @@ class Parameter:
     nonzero: bool = False
     integer: bool = False
     words: tuple[str, ...] | str = ()
-    other_defaults: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-
-    def default_of(self, robot: str | None) -> Any:
-        """The default for a robot, or for none in particular."""
-        return self.other_defaults.get(str(robot), self.default)
 
 
 @dataclasses.dataclass(frozen=True)
 class Kind:
-    """A disturbance by name, for the `robots` that honour it. `scalar` is the parameter that a bare number stands for.
+    """A disturbance by name.
 
-    A `repeated` kind takes a list of entries. Where it names a joint, "all" stands for one entry a joint.
+    Attributes:
+        requires: the capability of a robot that it takes.
+        scalar: the parameter that a bare number stands for.
+        repeated: whether it takes a list of entries. Where it names a joint, "all" stands for one entry a joint.
     """
 
     name: str
     text: str
     parameters: tuple[Parameter, ...]
+    requires: Capability
     scalar: str | None = None
     repeated: bool = False
-    robots: tuple[str, ...] = ROBOTS
+
+    def default_of(self, parameter: Parameter, robot: str | None) -> Any:
+        """Return a parameter's default for a robot, or for none in particular."""
+        own = {} if robot is None else ROBOTS[robot].defaults
+        return own.get(f"{self.name}.{parameter.name}", parameter.default)
+
+    def honored_by(self, robot: str | None) -> bool:
+        """Return whether a robot has what this takes; any kind may be read for no robot in particular."""
+        return robot is None or self.requires in ROBOTS[robot].capabilities
 
 
 ALL = "all"
@@ -60,8 +65,8 @@ NEVER = 1e9  # s
 SHAPES = ("half_sine", "double_hump")
 
 
-def _word(name: str, words: tuple[str, ...] | str, default: str | None, text: str, **other_defaults: str) -> Parameter:
-    return Parameter(name, "", 0, 0, default, text, size=0, words=words, other_defaults=other_defaults)
+def _word(name: str, words: tuple[str, ...] | str, default: str | None, text: str) -> Parameter:
+    return Parameter(name, "", 0, 0, default, text, size=0, words=words)
 
 
 def _time(name: str, default: float | None, text: str) -> Parameter:
@@ -84,18 +89,18 @@ KINDS: dict[str, Kind] = {
                     (0.0, 0.0, 0.16),
                     "its centre in the base frame",
                     size=3,
-                    other_defaults={"q450": (0.01, 0.0, -0.1)},
                 ),
                 _time("attach", 0.0, "from when; at 0 the episode starts in balance with it"),
                 _time("drop", NEVER, "until when; not after `attach`, it never appears"),
             ),
             scalar="mass",
+            requires="payload",
         ),
         Kind(
             "push",
             "A constant force for a while, in world axes.",
             (
-                _word("body", "site", "torso", "named site of the robot at which it acts", q450="body"),
+                _word("body", "site", "torso", "named site of the robot at which it acts"),
                 Parameter("magnitude", "N", 0.0, 500.0, None, "size of the force"),
                 Parameter(
                     "direction",
@@ -112,6 +117,7 @@ KINDS: dict[str, Kind] = {
                 Parameter("duration", "s", 1e-3, 60.0, 0.2, "how long"),
             ),
             repeated=True,
+            requires="sites",
         ),
         Kind(
             "grf_pulse",
@@ -124,14 +130,14 @@ KINDS: dict[str, Kind] = {
                 Parameter("q", "1", -1.0, 1.0, 0.4, "depth between the humps"),
             ),
             scalar="magnitude",
-            robots=("ojas",),
+            requires="feet",
         ),
         Kind(
             "friction",
             "Friction coefficient of the pair foot and ground.",
             (Parameter("coefficient", "1", 0.01, 2.0, None, "instead of the nominal 0.8"),),
             scalar="coefficient",
-            robots=("ojas",),
+            requires="feet",
         ),
         Kind(
             "slope",
@@ -141,7 +147,7 @@ KINDS: dict[str, Kind] = {
                 Parameter("roll_deg", "deg", -20.0, 20.0, 0.0, "above zero the ground rises to the left"),
             ),
             scalar="pitch_deg",
-            robots=("ojas",),
+            requires="feet",
         ),
         Kind(
             "wind",
@@ -172,14 +178,14 @@ KINDS: dict[str, Kind] = {
                 Parameter("turbulence_time", "s", 0.01, 10.0, 0.1, "its correlation time"),
             ),
             scalar="scale",
-            robots=("q450",),
+            requires="rotors",
         ),
         Kind(
             "ground_effect",
             "Rotors lift more close above the ground; see `artde_gym.disturbances.ground_effect`.",
             (Parameter("strength", "1", 0.0, 10.0, 1.0, "times which the published gain of thrust is larger"),),
             scalar="strength",
-            robots=("q450",),
+            requires="rotors",
         ),
         Kind(
             "sensor_noise",
@@ -198,25 +204,28 @@ KINDS: dict[str, Kind] = {
                 Parameter("angular_velocity", "rad/s", 0.0, 10.0, 0.0, "of the base or vehicle"),
             ),
             scalar="position",
+            requires="sensors",
         ),
         Kind(
             "encoder_bits",
             "Joint encoders of so many counts a turn; joint velocities are then differences of counts.",
             (Parameter("bits", "1", 6, 32, None, "2^bits counts a turn", integer=True),),
             scalar="bits",
-            robots=("ojas",),
+            requires="encoders",
         ),
         Kind(
             "torque_delay",
             "Commands act late.",
             (Parameter("samples", "1", 0, 100, None, "by so many control periods", integer=True),),
             scalar="samples",
+            requires="actuators",
         ),
         Kind(
             "motor_lag",
             "Torques, or thrusts of rotors, follow commands as a first-order lag.",
             (Parameter("time_constant", "s", 0.0, 1.0, None, "of the lag; for rotors in place of their own 0.035 s"),),
             scalar="time_constant",
+            requires="actuators",
         ),
         Kind(
             "actuator_loss",
@@ -227,12 +236,14 @@ KINDS: dict[str, Kind] = {
                 _time("start", 0.0, "from when"),
             ),
             repeated=True,
+            requires="actuators",
         ),
         Kind(
             "mass_error",
             "The robot is heavier or lighter than the nominal model, in all links, inertia included.",
             (Parameter("factor", "1", 0.5, 2.0, None, "true over nominal mass"),),
             scalar="factor",
+            requires="mass",
         ),
         Kind(
             "initial_pose",
@@ -242,13 +253,13 @@ KINDS: dict[str, Kind] = {
                 Parameter("offset", "rad", -0.5, 0.5, None, "added to the reference angle"),
             ),
             repeated=True,
-            robots=("ojas",),
+            requires="joints",
         ),
         Kind(
             "initial_position",
             "The episode starts off the reference path, at rest.",
             (Parameter("offset", "m", -0.3, 0.3, None, "added to the reference position", size=3),),
-            robots=("q450",),
+            requires="flight",
         ),
     )
 }
@@ -279,7 +290,7 @@ def page() -> str:
     """The grammar as a Markdown page, from the tables that check it."""
     lines = [f"| kind | {' | '.join(f'`{robot}`' for robot in ROBOTS)} |", "|---|" + "---|" * len(ROBOTS)]
     for kind in KINDS.values():
-        marks = ("yes" if robot in kind.robots else "" for robot in ROBOTS)
+        marks = ("yes" if kind.honored_by(robot) else "" for robot in ROBOTS)
         lines += [f"| `{kind.name}` | {' | '.join(marks)} |"]
     lines += [""]
     for kind in KINDS.values():
@@ -288,12 +299,18 @@ def page() -> str:
         lines += ["|---|---|---|---|---|"]
         for parameter in kind.parameters:
             default = "required" if parameter.default is None else f"`{parameter.default}`"
-            default += "".join(f"; {robot}: `{value}`" for robot, value in parameter.other_defaults.items())
+            default += "".join(f"; {robot}: `{value}`" for robot, value in other_defaults(kind, parameter).items())
             text = parameter.text + (" (what a bare number stands for)" if parameter.name == kind.scalar else "")
             row = (f"`{parameter.name}`", parameter.unit, allowed(parameter), default, text)
             lines.append("| " + " | ".join(row) + " |")
         lines.append("")
     return INTRODUCTION + "\n".join(lines)
+
+
+def other_defaults(kind: Kind, parameter: Parameter) -> dict[str, Any]:
+    """Return a parameter's defaults of robots that have another one than the kind."""
+    path = f"{kind.name}.{parameter.name}"
+    return {name: kit.defaults[path] for name, kit in ROBOTS.items() if path in kit.defaults}
 
 
 def allowed(parameter: Parameter) -> str:

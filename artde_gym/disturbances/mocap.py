@@ -22,7 +22,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from artde_gym.arrays import Array
 from artde_gym.disturbances.noise import Integers, normal_noise
-from artde_gym.robots.dynamics import GRAVITY
+from artde_gym.multibody.dynamics import GRAVITY
 from artde_gym.sim.rigid_bodies import cross, times, transposed_times, turned
 
 FRAME = 1 / 60  # s

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from artde_gym.robots.spec import Vector
+from artde_gym.multibody.spec import Vector
 from artde_gym.sim.engine import World
 
 NEVER = 2**62  # steps

@@ -15,7 +15,6 @@ from artde_gym.arguments import action_array
 from artde_gym.arrays import Array
 from artde_gym.disturbances.ground import LOADED
 from artde_gym.disturbances.schedule import Schedule
-from artde_gym.envs import biped_task as task
 from artde_gym.envs.biped_course import Course
 from artde_gym.envs.closed import CLOSED
 from artde_gym.envs.documentation import filled
@@ -23,8 +22,9 @@ from artde_gym.envs.live import Live
 from artde_gym.envs.options import disturbances_in
 from artde_gym.envs.view import View
 from artde_gym.errors import OptionError
-from artde_gym.robots import ojas as robot
-from artde_gym.robots.ojas import ActuatorInertia
+from artde_gym.robots.ojas import model as robot
+from artde_gym.robots.ojas import task
+from artde_gym.robots.ojas.model import ActuatorInertia
 from artde_gym.sim.engine import Camera, Engine
 from artde_gym.sim.factory import EngineName, make_engine
 from artde_gym.sim.rotation import arcsine, roll_pitch
@@ -56,10 +56,10 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
     Args:
         disturbances: in place of the task's own; see `artde_gym.disturbances`.
         control_period: time between two actions (s), a whole multiple of the physics' 0.001 s.
-        actuator_inertia: see `artde_gym.robots.ojas`.
-        arms: see `artde_gym.robots.ojas`.
+        actuator_inertia: see `artde_gym.robots.ojas.model`.
+        arms: see `artde_gym.robots.ojas.model`.
         self_collision: whether the feet stop each other; a walk as planned never lets them touch.
-        speed: see `artde_gym.references.walking`, also for `step_duration` and `duration`.
+        speed: see `artde_gym.robots.ojas.walking`, also for `step_duration` and `duration`.
         observe_ground_force: whether the observation ends with the ground's force on each foot.
         engine: physics engine.
         width, height: of pictures (pixels).

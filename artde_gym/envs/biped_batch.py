@@ -14,13 +14,13 @@ from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.ground import LOADED
 from artde_gym.disturbances.schedule import NEVER
 from artde_gym.disturbances.sensing import Sensing
-from artde_gym.envs import biped_task as task
 from artde_gym.envs.batch import BatchEnv, Mask
 from artde_gym.envs.biped_course import Course
 from artde_gym.envs.documentation import filled
 from artde_gym.errors import OptionError
-from artde_gym.robots import ojas as robot
-from artde_gym.robots.ojas import ActuatorInertia
+from artde_gym.robots.ojas import model as robot
+from artde_gym.robots.ojas import task
+from artde_gym.robots.ojas.model import ActuatorInertia
 from artde_gym.sim.factory import make_batch
 from artde_gym.sim.rotation import arcsine, roll_pitch
 

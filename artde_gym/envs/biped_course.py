@@ -12,7 +12,7 @@ from artde_gym.disturbances.actuation import Actuation
 from artde_gym.disturbances.ground import GrfPulse
 from artde_gym.disturbances.schedule import Schedule
 from artde_gym.disturbances.sensing import Sensing
-from artde_gym.envs.biped_task import OBSERVATION, TIME_STEP, Walk
+from artde_gym.robots.ojas.task import OBSERVATION, TIME_STEP, Walk
 from artde_gym.sim.engine import World
 
 FOOT_SITES = ("left_foot", "right_foot")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from artde_gym.disturbances.pushes import ARM_PUSH, CHEST_PUSH
 from artde_gym.envs import biped_batch
 from artde_gym.envs.biped import BipedEnv, document
+from artde_gym.robots.ojas.pushes import ARM_PUSH, CHEST_PUSH
 
 DISTURBANCES: dict[str, Any] = {"payload": 1.3, "push": [CHEST_PUSH, ARM_PUSH]}
 _DEFAULT = "payload of 1.3 kg and the two pushes"

@@ -8,7 +8,7 @@ from typing import Any
 
 from artde_gym.disturbances.schedule import Push, Schedule
 from artde_gym.errors import RobotError
-from artde_gym.robots.spec import RobotSpec, Vector
+from artde_gym.multibody.spec import RobotSpec, Vector
 from artde_gym.sim.engine import Engine
 
 

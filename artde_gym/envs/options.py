@@ -1,28 +1,12 @@
-"""Arguments and reset options that all environments understand."""
+"""Reset options that all environments understand."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
-from artde_gym.arguments import number
 from artde_gym.errors import OptionError
 from artde_gym.scenarios import scenario
-
-
-def steps_per_period(control_period: float, step: float) -> int:
-    """How many steps of `step` (s) make a control period.
-
-    Raises:
-        OptionError: unless it is a whole number, and the period 0.05 s at most.
-    """
-    allowed = f"whole multiples of {step} s up to 0.05 s"
-    period = number("control_period", control_period, 0.0, 0.05 + 0.5 * step, allowed)
-    steps = round(period / step)
-    if not (1 <= steps <= round(0.05 / step) and math.isclose(steps * step, period, rel_tol=1e-9)):
-        raise OptionError("control_period", control_period, allowed)
-    return steps
 
 
 def disturbances_in(options: Mapping[str, Any], env: Any) -> Mapping[str, Any] | None:

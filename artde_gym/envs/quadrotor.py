@@ -11,24 +11,24 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from artde_gym.arguments import action_array
+from artde_gym.arguments import action_array, steps_per_period
 from artde_gym.arrays import Array
 from artde_gym.disturbances.ground_effect import thrust_gain
 from artde_gym.disturbances.noise import draw_keys
-from artde_gym.disturbances.rotors import Rotors
 from artde_gym.disturbances.schedule import Schedule
 from artde_gym.disturbances.wind import GRID, Wind
-from artde_gym.envs import quadrotor_task as task
 from artde_gym.envs.closed import CLOSED
 from artde_gym.envs.documentation import filled
 from artde_gym.envs.live import Live
-from artde_gym.envs.options import disturbances_in, steps_per_period
+from artde_gym.envs.options import disturbances_in
 from artde_gym.envs.quadrotor_sensors import Measurement, Sensors
 from artde_gym.envs.view import View
 from artde_gym.errors import OptionError
-from artde_gym.references.infinity import START
-from artde_gym.robots import q450 as robot
-from artde_gym.robots.spec import Vector
+from artde_gym.multibody.spec import Vector
+from artde_gym.robots.q450 import model as robot
+from artde_gym.robots.q450 import task
+from artde_gym.robots.q450.infinity import START
+from artde_gym.robots.q450.rotors import Rotors
 from artde_gym.sim.engine import Camera, Engine
 from artde_gym.sim.factory import EngineName, make_engine
 from artde_gym.sim.rotation import matrix

@@ -7,18 +7,18 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from artde_gym.arguments import steps_per_period
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.noise import draw_keys
 from artde_gym.disturbances.wind import GRID
-from artde_gym.envs import quadrotor_task as task
 from artde_gym.envs.batch import BatchEnv, Mask
 from artde_gym.envs.documentation import filled
-from artde_gym.envs.options import steps_per_period
 from artde_gym.envs.quadrotor_fleet import Fleet
 from artde_gym.envs.quadrotor_sensors import Measurement, Sensors
 from artde_gym.errors import OptionError
-from artde_gym.robots import q450 as robot
+from artde_gym.robots.q450 import model as robot
+from artde_gym.robots.q450 import task
 
 FLEET = 4096  # vehicles that are simulated together; with more, arrays no longer fit into caches
 

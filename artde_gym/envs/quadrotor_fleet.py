@@ -19,9 +19,9 @@ from artde_gym.disturbances.kinds import KINDS
 from artde_gym.disturbances.noise import uniform_noise
 from artde_gym.disturbances.schedule import NEVER, Push
 from artde_gym.disturbances.wind import GRID, Air, advance, air, processes, velocity
-from artde_gym.envs import quadrotor_task as task
-from artde_gym.robots import q450 as robot
-from artde_gym.robots.lag import follow, lag_shares
+from artde_gym.multibody.lag import follow, lag_shares
+from artde_gym.robots.q450 import model as robot
+from artde_gym.robots.q450 import task
 from artde_gym.sim.engine import PAYLOAD_RADIUS
 from artde_gym.sim.rigid_bodies import MassProperties, RigidBodies, composite, cross, transposed_times
 

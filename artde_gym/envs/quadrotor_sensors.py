@@ -11,8 +11,8 @@ from numpy.typing import DTypeLike, NDArray
 from artde_gym.arrays import Array
 from artde_gym.disturbances.mocap import Mocap
 from artde_gym.disturbances.vehicle_noise import VehicleNoise
-from artde_gym.envs.quadrotor_task import POSITION, RATES, ROT, VELOCITY
 from artde_gym.errors import OptionError
+from artde_gym.robots.q450.task import POSITION, RATES, ROT, VELOCITY
 
 Measurement = Literal["ideal", "mocap"]
 

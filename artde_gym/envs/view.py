@@ -13,7 +13,7 @@ from PIL import Image, ImageDraw, ImageFont
 from artde_gym.arrays import Array
 from artde_gym.disturbances.schedule import Push
 from artde_gym.errors import OptionError
-from artde_gym.robots.spec import Vector
+from artde_gym.multibody.spec import Vector
 from artde_gym.sim.camera import Camera
 from artde_gym.sim.engine import Engine
 

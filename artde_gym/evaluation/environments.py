@@ -12,6 +12,7 @@ import gymnasium as gym
 from gymnasium.envs.registration import load_env_creator
 
 from artde_gym.errors import OptionError, among
+from artde_gym.kit import ROBOTS
 from artde_gym.tracking import Tracking
 
 Backend = Literal["single", "batch"]
@@ -51,8 +52,14 @@ def robot_of(env_id: str) -> str:
 
 
 def ours() -> list[str]:
-    """Ids of this project's environments."""
-    return [spec.id for spec in gym.registry.values() if str(spec.entry_point).startswith("artde_gym.")]
+    """Ids of the environments of all robots."""
+    return [entry.env_id for kit in ROBOTS.values() for entry in kit.environments]
+
+
+def main_scenarios(env_id: str) -> tuple[str, ...]:
+    """Return the scenarios that are run in an environment where none is named; empty for the environment as it is."""
+    entries = [entry for kit in ROBOTS.values() for entry in kit.environments]
+    return next((entry.main for entry in entries if entry.env_id == env_id), ())
 
 
 @functools.lru_cache(maxsize=KEPT)

@@ -14,12 +14,12 @@ from scipy.linalg import eigh
 from artde_gym.arrays import Array
 from artde_gym.evaluation.console import REFERENCE
 from artde_gym.evaluation.environments import single
+from artde_gym.multibody.dynamics import RigidBodyTree, joint_space_inertia
 from artde_gym.palette import OTHERS
 from artde_gym.registration import make_controller, registered_controllers
 from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.html import Cell, details, figure, paragraph, table
 from artde_gym.report.run import Run
-from artde_gym.robots.dynamics import RigidBodyTree, joint_space_inertia
 
 SAMPLES = 200  # of the reference, at which the inertia is taken
 LOOP = {"position": "_p", "attitude": "_q"}

@@ -22,6 +22,7 @@ from artde_gym.errors import ArtdeGymError
 from artde_gym.evaluation.environments import robot_of
 from artde_gym.evaluation.evaluate import CUSTOM
 from artde_gym.evaluation.metrics import Span, events_of
+from artde_gym.kit import ROBOTS
 from artde_gym.registration import registered_controllers
 from artde_gym.report.answer import metric_of, ranking
 from artde_gym.report.html import figure, paragraph
@@ -36,8 +37,6 @@ QUALITY = 72  # of a picture as WebP
 BEFORE_FALL = (1.2, 0.8, 0.4, 0.2, 0.0)  # s
 BEFORE_EVENT, AFTER_EVENT = 0.1, (0.3, 0.8, 1.5)  # s
 MOTION = 6  # pictures of the undisturbed motion
-PERIOD = {"ojas": ("walk", 6.0, 2.0), "q450": ("flight", 4.0, 29.0)}
-"""Robot -> its motion, when it has become periodic, and its period (s)."""
 LENGTH, LEAD = 10.0, 6.0  # s, of a video, and how much of it is before what is to be seen
 
 Progress = Callable[[str], None]
@@ -137,13 +136,13 @@ class Album:
         falls = [float(row["time_to_fall_s"]) for row in rows if row["fell"]]
         if falls:
             return min(falls)
-        _, settled, _ = PERIOD[robot_of(self.run.cell(scenario)["env_id"])]
+        _, settled, _ = ROBOTS[robot_of(self.run.cell(scenario)["env_id"])].motion
         later = [begin for begin, _ in _spans(rows[0]).values() if begin > settled]
         return min([*later, settled + LEAD])
 
     def _moving(self, scenario: str, name: str, row: Row) -> list[Sight]:
         """One period of the motion."""
-        motion, settled, period = PERIOD[robot_of(self.run.cell(scenario)["env_id"])]
+        motion, settled, period = ROBOTS[robot_of(self.run.cell(scenario)["env_id"])].motion
         start, span = min(settled, 0.3 * row["duration_s"]), min(period, 0.6 * row["duration_s"])
         times = [start + span * i / MOTION for i in range(MOTION)]
         return [Sight(f"The {motion} under {name}", time, f"{time:.2f} s") for time in times]

@@ -13,11 +13,12 @@ from artde_gym.arguments import reading
 from artde_gym.errors import StoreError
 from artde_gym.evaluation.environments import robot_of
 from artde_gym.evaluation.store import write_atomically
-from artde_gym.report import biped, diagram, flight, frontier_page, signals, tables, training_page
+from artde_gym.report import frontier_page, signals, tables, training_page
 from artde_gym.report.answer import headline, sentences
 from artde_gym.report.html import bullets, page, paragraph, section
 from artde_gym.report.laws import Laws, unavailable
 from artde_gym.report.pictures import Album, Progress
+from artde_gym.report.robot import figures_of
 from artde_gym.report.run import Episode, Run
 from artde_gym.scenarios import SCENARIOS
 from artde_gym.studies.frontier.result import RECORD
@@ -81,18 +82,13 @@ def _evaluation(run: Run, album: Album) -> str:
 
 
 def _plants(run: Run) -> list[str]:
-    """What the scenarios share: a block diagram of each robot's loop, and each walking pattern once."""
+    """Return what scenarios share: each robot's loop once, and each of its references once."""
     parts: dict[str, list[str]] = {}
     for scenario in run.result.scenarios:
         cell = run.cell(scenario)
-        if robot_of(cell["env_id"]) == "ojas":
-            arguments = biped.pattern_of(cell["kwargs"])
-            parts.setdefault("ojas", [diagram.joint_loop()])
-            key = f"pattern {json.dumps(arguments)}"
-            if key not in parts:
-                parts[key] = biped.reference(arguments)
-        else:
-            parts.setdefault("q450", [diagram.cascade()])
+        figures = figures_of(robot_of(cell["env_id"]))
+        if figures is not None:
+            parts |= {key: part for key, part in figures.reference(cell["kwargs"]).items() if key not in parts}
     return [part for several in parts.values() for part in several]
 
 
@@ -123,8 +119,8 @@ def _episode(run: Run, laws: Laws, scenario: str, episode: Episode) -> list[str]
         inside = laws.section(scenario)
     except ValueError as error:  # a controller, a gain or an environment of then that is none any more
         inside = [unavailable(error)]
-    walks = robot_of(run.cell(scenario)["env_id"]) == "ojas"
-    return [*parts, *(biped if walks else flight).figures(episode), *inside]
+    figures = figures_of(robot_of(run.cell(scenario)["env_id"]))
+    return [*parts, *([] if figures is None else figures.figures(episode)), *inside]
 
 
 def _frontier(folder: Path) -> str:

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
 from artde_gym.errors import RobotError
-from artde_gym.robots.spec import RobotSpec, Vector
-from artde_gym.robots.urdf import urdf
+from artde_gym.multibody.spec import RobotSpec, Vector
+from artde_gym.multibody.urdf import urdf
 from artde_gym.sim.camera import FIELD_OF_VIEW, NEAR, Camera
 from artde_gym.sim.engine import PAYLOAD_COLOUR, PAYLOAD_LOOK, PAYLOAD_RADIUS, State
 from artde_gym.sim.ground import SUN, Shadow, paint

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from artde_gym.arrays import Array
-from artde_gym.robots.spec import Vector
+from artde_gym.multibody.spec import Vector
 
 FIELD_OF_VIEW = 40.0  # degrees, from the lower to the upper edge
 NEAR = 0.05  # m, before the eye, where a picture begins

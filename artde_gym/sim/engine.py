@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
-from artde_gym.robots.spec import RobotSpec, Vector
+from artde_gym.multibody.spec import RobotSpec, Vector
 from artde_gym.sim.camera import Camera
 from artde_gym.sim.rotation import Quaternion
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from artde_gym.errors import OptionError
-from artde_gym.robots.spec import RobotSpec
+from artde_gym.multibody.spec import RobotSpec
 from artde_gym.sim.engine import Engine
 
 if TYPE_CHECKING:

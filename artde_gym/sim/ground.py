@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFilter
 
 from artde_gym.arrays import Array
-from artde_gym.robots.dynamics import RigidBodyTree
-from artde_gym.robots.spec import RobotSpec, Vector
+from artde_gym.multibody.dynamics import RigidBodyTree
+from artde_gym.multibody.spec import RobotSpec, Vector
 from artde_gym.sim.camera import Camera
 from artde_gym.sim.engine import PAYLOAD_LOOK, State
 from artde_gym.sim.rotation import matrix

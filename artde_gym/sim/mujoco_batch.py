@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
 from artde_gym.errors import RobotError
-from artde_gym.robots.spec import RobotSpec, Vector
+from artde_gym.multibody.spec import RobotSpec, Vector
 from artde_gym.sim.mujoco_world import FIELDS, Blueprint, Fields, MujocoWorld
 from artde_gym.sim.rotation import rotated
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artde_gym.errors import OptionError
-from artde_gym.robots.spec import Vector
+from artde_gym.multibody.spec import Vector
 from artde_gym.sim.camera import Camera
 from artde_gym.sim.engine import PAYLOAD_COLOUR, PAYLOAD_LOOK
 

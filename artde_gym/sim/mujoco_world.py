@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
 from artde_gym.errors import RobotError
-from artde_gym.robots.mjcf import PAYLOAD, mjcf
-from artde_gym.robots.spec import RobotSpec, Vector
+from artde_gym.multibody.mjcf import PAYLOAD, mjcf
+from artde_gym.multibody.spec import RobotSpec, Vector
 from artde_gym.sim.engine import PAYLOAD_RADIUS
 
 mj: Any = mujoco  # compiled, without type information

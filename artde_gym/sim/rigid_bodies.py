@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from artde_gym.arrays import Array
-from artde_gym.robots.dynamics import GRAVITY
-from artde_gym.robots.spec import Vector
+from artde_gym.multibody.dynamics import GRAVITY
+from artde_gym.multibody.spec import Vector
 
 ALL = slice(None)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TypeAlias, TypeVar
 
 from artde_gym.arrays import Array
-from artde_gym.robots.spec import Vector
+from artde_gym.multibody.spec import Vector
 
 Number = TypeVar("Number", float, Array)
 

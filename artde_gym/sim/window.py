@@ -14,8 +14,8 @@ import numpy as np
 import pybullet_data
 
 from artde_gym.errors import OptionError
-from artde_gym.robots.spec import RobotSpec, Vector
-from artde_gym.robots.urdf import urdf
+from artde_gym.multibody.spec import RobotSpec, Vector
+from artde_gym.multibody.urdf import urdf
 from artde_gym.sim.camera import Camera
 from artde_gym.sim.engine import PAYLOAD_COLOUR, PAYLOAD_LOOK, State
 from artde_gym.sim.ground import SUN

@@ -20,7 +20,7 @@ def tde_eigenvalues(inertia: NDArray[np.floating[Any]], m_bar: Inertia) -> NDArr
 
     Args:
         inertia: joint-space inertia M (..., n, n) (kg m^2), symmetric and positive definite; for a floating base its
-            Schur complement over the base, `artde_gym.robots.dynamics.joint_space_inertia`.
+            Schur complement over the base, `artde_gym.multibody.dynamics.joint_space_inertia`.
         m_bar: the nominal inertia of the law: a number, one a joint, or a positive definite matrix.
 
     Raises:

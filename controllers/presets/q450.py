@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from artde_gym.robots.dynamics import GRAVITY
-from artde_gym.robots.q450 import INERTIA, MASS
+from artde_gym.multibody.dynamics import GRAVITY
+from artde_gym.robots.q450.model import INERTIA, MASS
 from controllers.laws.artde import ArtdeGains
 from controllers.laws.asmc import AsmcGains
 from controllers.laws.atde import AtdeGains

@@ -14,8 +14,9 @@ from scipy.spatial.transform import Rotation
 from artde_gym.arrays import Array
 from artde_gym.palette import looks
 from artde_gym.report.chart import Axis, Chart
-from artde_gym.report.diagram import cascade, joint_loop
 from artde_gym.report.html import figure
+from artde_gym.robots.ojas.report import loop as joint_loop
+from artde_gym.robots.q450.report import loop as cascade_loop
 from controllers.law_table import LAWS
 from controllers.laws.attitude import attitude_error
 from controllers.laws.computed_torque import ComputedTorqueGains
@@ -207,7 +208,7 @@ def geometric() -> str:
         "from four tilts about a skew axis. The error is the sine of the angle: it is largest at 90 degrees and "
         "vanishes upside down, where the body therefore lingers."
     )
-    return figure(caption, {"angle": fall.svg(), "error": law.svg()}, shown) + cascade()
+    return figure(caption, {"angle": fall.svg(), "error": law.svg()}, shown) + cascade_loop()
 
 
 FIGURES: dict[str, Callable[[], str]] = {

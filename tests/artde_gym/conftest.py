@@ -7,9 +7,9 @@ import pinocchio
 import pytest
 
 from artde_gym.errors import OptionError
-from artde_gym.robots.ojas import ojas
-from artde_gym.robots.spec import RobotSpec
-from artde_gym.robots.urdf import urdf
+from artde_gym.multibody.spec import RobotSpec
+from artde_gym.multibody.urdf import urdf
+from artde_gym.robots.ojas.model import ojas
 from artde_gym.sim.factory import EngineName, make_engine
 
 pin: Any = pinocchio  # compiled, without type information

@@ -167,7 +167,7 @@ def test_saturation_is_what_the_observation_reports() -> None:
 
 
 def test_reward_is_the_scaled_sum_of_its_terms() -> None:
-    from artde_gym.envs.biped_task import REWARD_SCALES
+    from artde_gym.robots.ojas.task import REWARD_SCALES
 
     env = make(control_period=0.004)
     env.reset(seed=0)

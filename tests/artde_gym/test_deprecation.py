@@ -25,7 +25,7 @@ def test_an_old_module_has_what_the_new_one_has(old: str):
 
 @pytest.mark.parametrize("name", ["Frontier", "reproduce", "sweep", "tune", "SCENARIOS", "scenario"])
 def test_an_old_name_of_the_evaluation_is_the_new_one(name: str):
-    vars(evaluation).pop(name, None)  # set there by an import of the old module of that name
+    evaluation.__dict__.pop(name, None)  # set there by an import of the old module of that name
     with pytest.warns(DeprecationWarning, match=f"evaluation.{name} is deprecated"):
         old = getattr(evaluation, name)
     new = importlib.import_module("artde_gym.scenarios" if name in ("SCENARIOS", "scenario") else "artde_gym.studies")

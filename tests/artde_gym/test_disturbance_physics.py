@@ -18,9 +18,9 @@ import artde_gym  # noqa: F401  (registers the environments)
 import controllers
 from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.ground import AIRBORNE, GrfPulse
-from artde_gym.robots.dynamics import RigidBodyTree
-from artde_gym.robots.ojas import HIP_OFFSET, TOTAL_MASS, ojas
-from artde_gym.robots.spec import RobotSpec
+from artde_gym.multibody.dynamics import RigidBodyTree
+from artde_gym.multibody.spec import RobotSpec
+from artde_gym.robots.ojas.model import HIP_OFFSET, TOTAL_MASS, ojas
 from artde_gym.sim.bullet import bullet
 from artde_gym.sim.engine import Engine, State
 from artde_gym.sim.factory import EngineName, make_engine

@@ -311,7 +311,7 @@ def test_a_robot_refuses_the_kinds_that_it_cannot_honour(robot, kind):
         p.name: words(p)[0] if p.size == 0 else [p.low] * p.size if p.size > 1 else p.low for p in kind.parameters
     }
     given_ = {kind.name: example}
-    if robot in kind.robots:
+    if kind.honored_by(robot):
         assert Disturbances.parse(given_, SITES, JOINTS, robot).entries
         return
     with pytest.raises(DisturbanceError) as caught:
@@ -320,15 +320,17 @@ def test_a_robot_refuses_the_kinds_that_it_cannot_honour(robot, kind):
     assert caught.value.value == kind.name
     assert robot in caught.value.allowed
     named = caught.value.allowed.split(" (did you mean")[0].replace(",", "").split()
-    assert set(named) >= {other.name for other in KINDS.values() if robot in other.robots}
-    assert set(named).isdisjoint(other.name for other in KINDS.values() if robot not in other.robots)
+    assert set(named) >= {other.name for other in KINDS.values() if other.honored_by(robot)}
+    assert set(named).isdisjoint(other.name for other in KINDS.values() if not other.honored_by(robot))
 
 
 def test_each_robot_has_its_kinds_and_defaults():
     assert {"friction", "slope", "grf_pulse", "encoder_bits", "initial_pose"} <= {
-        kind.name for kind in KINDS.values() if kind.robots == ("ojas",)
+        kind.name for kind in KINDS.values() if kind.honored_by("ojas") and not kind.honored_by("q450")
     }
-    assert {"wind", "ground_effect", "initial_position"} == {k.name for k in KINDS.values() if k.robots == ("q450",)}
+    assert {"wind", "ground_effect", "initial_position"} == {
+        kind.name for kind in KINDS.values() if kind.honored_by("q450") and not kind.honored_by("ojas")
+    }
     push = {"magnitude": 1, "start": 0}
     for robot, body, place in (("ojas", "torso", [0.0, 0.0, 0.16]), ("q450", "body", [0.01, 0.0, -0.1])):
         parsed = Disturbances.parse({"payload": 1.0, "push": push}, (body, "other"), JOINTS, robot)

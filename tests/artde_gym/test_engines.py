@@ -13,9 +13,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from artde_gym.errors import OptionError, RobotError
-from artde_gym.robots.dynamics import RigidBodyTree
-from artde_gym.robots.ojas import ojas
-from artde_gym.robots.spec import RobotSpec, box_link
+from artde_gym.multibody.dynamics import RigidBodyTree
+from artde_gym.multibody.spec import RobotSpec, box_link
+from artde_gym.robots.ojas.model import ojas
 from artde_gym.sim.engine import Camera, Engine, State
 from artde_gym.sim.factory import EngineName, make_batch, make_engine
 

@@ -20,11 +20,11 @@ from typer.testing import CliRunner
 
 import artde_gym
 from artde_gym.cli import app
-from artde_gym.envs import quadrotor_task
 from artde_gym.errors import ArtdeGymError, DisturbanceError, OptionError, StoreError, UnknownNameError
 from artde_gym.evaluation import Result, evaluate, statistics, thesis
 from artde_gym.evaluation.console import print_result
 from artde_gym.evaluation.evaluate import Update, episode_seed
+from artde_gym.robots.q450 import task as quadrotor_task
 from artde_gym.scenarios import SCENARIOS
 from artde_gym.studies import reproduce
 from controllers import GainError
@@ -330,7 +330,7 @@ def test_command_prints_ours_beside_the_thesis(tmp_path: Path) -> None:
 
 def test_reproduce_runs_both_robots_in_both_engines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("S1", "Q1"):
-        monkeypatch.setitem(SCENARIOS, name, dataclasses.replace(SCENARIOS[name], kwargs={"duration": 0.2}))
+        monkeypatch.setitem(SCENARIOS._entries, name, dataclasses.replace(SCENARIOS[name], kwargs={"duration": 0.2}))
     arguments = ["reproduce", "--scenario", "S1,Q1", "--episodes", "1", "--workers", "1", "--out", str(tmp_path)]
     outcome = CliRunner().invoke(app, [*arguments, "--engine", "both"])
     assert outcome.exit_code == 0, outcome.output
@@ -347,7 +347,7 @@ def test_the_ablation_is_as_stiff_as_artde_was_in_the_same_scenario(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("S1", "S2"):
-        monkeypatch.setitem(SCENARIOS, name, dataclasses.replace(SCENARIOS[name], kwargs=SHORT))
+        monkeypatch.setitem(SCENARIOS._entries, name, dataclasses.replace(SCENARIOS[name], kwargs=SHORT))
     without = reproduce("biped", tmp_path, scenarios=["S1", "S2"], episodes=2)
     assert "tde+kd" not in without.result.controllers
     assert not without.claims["claim"].str.contains("tde+kd", regex=False).any()

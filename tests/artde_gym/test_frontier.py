@@ -28,7 +28,7 @@ from artde_gym.studies.frontier.axis import Axis, axis
 from artde_gym.studies.frontier.figure import draw
 from artde_gym.studies.frontier.result import value_text
 from artde_gym.studies.frontier.search import LEVEL_COLUMNS, TABLE_COLUMNS, _frontier, search
-from artde_gym.studies.frontier.standard import STANDARDS, standard_test
+from artde_gym.studies.frontier.standard import standard_for, standard_test
 
 PUSH = "BipedPush-v0"
 QUADROTOR = "QuadInfinity-Payload-v0"
@@ -151,7 +151,9 @@ def test_survival_that_rises_again_is_shown_as_it_is() -> None:
 def test_every_default_is_an_axis_and_every_level_of_it_is_in_the_grammar(
     env_id: str, robot: str, sites: Any, joints: list[str], duration: float
 ) -> None:
-    for path, default in STANDARDS[robot].ranges.items():
+    standard = standard_for(env_id)
+    assert standard is not None
+    for path, default in standard.ranges.items():
         varied = axis(env_id, path)
         assert varied.path == path
         assert varied.harder == default.harder
@@ -243,7 +245,7 @@ def test_bad_axes_are_refused(arguments: dict[str, Any], error: type[ArtdeGymErr
 def test_paths_follow_the_grammar(env_id: str, robot: str) -> None:
     for kind in KINDS.values():
         for parameter in kind.parameters:
-            if parameter.size == 1 and robot not in kind.robots:
+            if parameter.size == 1 and not kind.honored_by(robot):
                 with pytest.raises(UnknownNameError, match=kind.name):
                     axis(env_id, f"{kind.name}.{parameter.name}")
             elif parameter.size == 1:

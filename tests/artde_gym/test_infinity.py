@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from artde_gym.errors import OptionError
-from artde_gym.references.infinity import LOOPS, RAMP, START, infinity_path
+from artde_gym.robots.q450.infinity import LOOPS, RAMP, START, infinity_path
 
 PERIOD = 0.002
 

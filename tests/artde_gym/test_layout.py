@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from artde_gym.envs.biped_task import ACTION, OBSERVATION
 from artde_gym.errors import UnknownNameError
 from artde_gym.layout import Field, Layout
+from artde_gym.robots.ojas.task import ACTION, OBSERVATION
 
 MIXED = Layout(
     (Field("a", 3, "rad", -1.0, 1.0, "angles"), Field("b", 1, "1", 0.0, 2.0, "flag"), Field("c", 2, "N", -5.0, 0.0, ""))

@@ -11,9 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from artde_gym.disturbances.kinds import NEVER
-from artde_gym.envs import biped_task, quadrotor_task
 from artde_gym.evaluation.metrics import Metrics, events_of
 from artde_gym.layout import Layout
+from artde_gym.robots.ojas import task as biped_task
+from artde_gym.robots.q450 import task as quadrotor_task
 from artde_gym.tracking import Tracking
 
 Signals = dict[str, np.ndarray]

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from artde_gym.robots.dynamics import GRAVITY, RigidBodyTree
-from artde_gym.robots.mjcf import PAYLOAD, mjcf
-from artde_gym.robots.ojas import ojas
-from artde_gym.robots.spec import RobotSpec, box_link
+from artde_gym.multibody.dynamics import GRAVITY, RigidBodyTree
+from artde_gym.multibody.mjcf import PAYLOAD, mjcf
+from artde_gym.multibody.spec import RobotSpec, box_link
+from artde_gym.robots.ojas.model import ojas
 from artde_gym.sim.mujoco import MujocoEngine, mj
 
 SPECS = {

@@ -13,9 +13,9 @@ import artde_gym  # noqa: F401  (registers the environments)
 import controllers
 from artde_gym.envs.view import PUSH
 from artde_gym.errors import OptionError, RobotError
-from artde_gym.robots.dynamics import RigidBodyTree
-from artde_gym.robots.ojas import ojas
-from artde_gym.robots.spec import RobotSpec, box_link
+from artde_gym.multibody.dynamics import RigidBodyTree
+from artde_gym.multibody.spec import RobotSpec, box_link
+from artde_gym.robots.ojas.model import ojas
 from artde_gym.sim.camera import Camera
 from artde_gym.sim.factory import EngineName, make_engine
 from artde_gym.sim.ground import SUN, Shadow

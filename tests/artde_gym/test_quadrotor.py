@@ -14,9 +14,9 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
 
 import artde_gym  # noqa: F401  (registers the environments)
-from artde_gym.envs.quadrotor_task import REWARD_SCALES
 from artde_gym.errors import ActionError, ArtdeGymError, DisturbanceError, OptionError, UnknownNameError
-from artde_gym.references.infinity import START, infinity_path
+from artde_gym.robots.q450.infinity import START, infinity_path
+from artde_gym.robots.q450.task import REWARD_SCALES
 
 ID = "QuadInfinity-Payload-v0"
 WEIGHT = 1.48 * 9.81

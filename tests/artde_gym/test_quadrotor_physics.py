@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 import artde_gym  # noqa: F401  (registers the environments)
 from artde_gym.disturbances.ground_effect import thrust_gain
-from artde_gym.robots import q450
+from artde_gym.robots.q450 import model as q450
 
 ID = "QuadInfinity-Payload-v0"
 G = 9.81

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from artde_gym.robots.q450 import INERTIA, MASS, PAYLOAD_PLACE, q450
+from artde_gym.robots.q450.model import INERTIA, MASS, PAYLOAD_PLACE, q450
 from artde_gym.sim.factory import EngineName, make_engine
 from artde_gym.sim.rigid_bodies import MassProperties, RigidBodies, composite, cross, times, transposed_times, turned
 from artde_gym.sim.rotation import matrix

@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from artde_gym.errors import OptionError, RobotError
-from artde_gym.references.walking import walking_pattern
-from artde_gym.robots import ojas as constants
-from artde_gym.robots.dynamics import GRAVITY, RigidBodyTree, joint_space_inertia
-from artde_gym.robots.leg_ik import leg_angles
-from artde_gym.robots.ojas import ojas
-from artde_gym.robots.spec import RobotSpec, box_link
-from artde_gym.robots.support import Supported
+from artde_gym.multibody.dynamics import GRAVITY, RigidBodyTree, joint_space_inertia
+from artde_gym.multibody.spec import RobotSpec, box_link
+from artde_gym.multibody.support import Supported
+from artde_gym.robots.ojas import model as constants
+from artde_gym.robots.ojas.leg_ik import leg_angles
+from artde_gym.robots.ojas.model import ojas
+from artde_gym.robots.ojas.walking import walking_pattern
 from artde_gym.sim.bullet import BulletEngine
 from artde_gym.sim.factory import make_engine
 from controllers.laws.validity import tde_eigenvalues, tde_is_valid

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from artde_gym.disturbances.rotors import Rotors
-from artde_gym.robots import q450
-from artde_gym.robots.lag import lag_shares
+from artde_gym.multibody.lag import lag_shares
+from artde_gym.robots.q450 import model as q450
+from artde_gym.robots.q450.rotors import Rotors
 
 STEP = 0.001
 STEPS = 15

@@ -8,9 +8,9 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from artde_gym.errors import OptionError
-from artde_gym.references.walking import STAND, WalkingPattern, hip_height_above_ankle, walking_pattern
-from artde_gym.robots.dynamics import GRAVITY, RigidBodyTree
-from artde_gym.robots.ojas import ANKLE_HEIGHT, FOOT_CENTRE_AHEAD, FOOT_SIZE, HIP_OFFSET, ojas
+from artde_gym.multibody.dynamics import GRAVITY, RigidBodyTree
+from artde_gym.robots.ojas.model import ANKLE_HEIGHT, FOOT_CENTRE_AHEAD, FOOT_SIZE, HIP_OFFSET, ojas
+from artde_gym.robots.ojas.walking import STAND, WalkingPattern, hip_height_above_ankle, walking_pattern
 
 PERIOD, DURATION, STEPS = 0.001, 58.0, 54
 SPEEDS = (0.1, 0.2)

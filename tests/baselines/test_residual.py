@@ -8,12 +8,12 @@ import pytest
 
 import artde_gym  # noqa: F401  # registers the environments
 import controllers
-from artde_gym.envs.biped_task import OBSERVATION
-from artde_gym.envs.quadrotor_task import ACTION
 from artde_gym.errors import ActionError, OptionError
 from artde_gym.registration import registered_controllers
-from artde_gym.robots import ojas as robot
-from artde_gym.robots.leg_ik import leg_angles
+from artde_gym.robots.ojas import model as robot
+from artde_gym.robots.ojas.leg_ik import leg_angles
+from artde_gym.robots.ojas.task import OBSERVATION
+from artde_gym.robots.q450.task import ACTION
 from baselines import legs, ojas
 from baselines.network import Network
 from baselines.recipe import Recipe

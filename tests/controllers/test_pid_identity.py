@@ -6,7 +6,7 @@ import pytest
 
 import artde_gym  # noqa: F401  # registers the environment
 import controllers
-from artde_gym.envs.biped_task import OBSERVATION
+from artde_gym.robots.ojas.task import OBSERVATION
 
 M_BAR, K_P, K_D = 0.042, 25.0, 10.0
 DISTURBANCES = {

@@ -13,8 +13,8 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 import artde_gym
 import controllers
 from artde_gym import registration
-from artde_gym.envs.biped_task import OBSERVATION
 from artde_gym.errors import OptionError, UnknownNameError
+from artde_gym.robots.ojas.task import OBSERVATION
 from controllers.laws.errors import GainError
 
 LAWS = ["tde", "atde", "artde", "artde-robust", "pid", "tde+c", "tde+kd"]

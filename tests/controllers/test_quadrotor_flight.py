@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import artde_gym  # noqa: F401  # registers the environment
 import controllers
-from artde_gym.robots import q450
+from artde_gym.robots.q450 import model as q450
 from controllers.law_table import LAWS, Nothing
 from controllers.laws.cascade import CascadeGains, Flight, cascade, cascade_start
 from controllers.laws.tde import TdeGains

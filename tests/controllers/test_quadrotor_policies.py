@@ -13,8 +13,8 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 
 import artde_gym  # noqa: F401  # registers the environment
 import controllers
-from artde_gym.envs.quadrotor_task import OBSERVATION
 from artde_gym.errors import UnknownNameError
+from artde_gym.robots.q450.task import OBSERVATION
 from controllers.laws.errors import GainError
 
 ID = "QuadInfinity-Payload-v0"

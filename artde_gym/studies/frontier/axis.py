@@ -10,7 +10,8 @@ from typing import Any
 from artde_gym.disturbances import KINDS
 from artde_gym.errors import OptionError, UnknownNameError, among
 from artde_gym.evaluation.environments import arguments_of, robot_of
-from artde_gym.studies.frontier.standard import Harder, standard_for
+from artde_gym.kit import Harder
+from artde_gym.studies.frontier.standard import standard_for
 
 FINEST = 1e-6  # tolerance relative to the ends; finer steps would drown in the digits of a level's name
 
@@ -123,7 +124,7 @@ def _find(env_id: str, path: str) -> tuple[str | None, str, str]:
     disturbances = {
         f"{kind.name}.{parameter.name}": (kind.name, parameter.name, parameter.unit)
         for kind in KINDS.values()
-        if robot in kind.robots
+        if kind.honored_by(robot)
         for parameter in kind.parameters
         if parameter.size == 1
     }

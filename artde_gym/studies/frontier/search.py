@@ -41,9 +41,10 @@ from artde_gym.evaluation.evaluate import CUSTOM, Update, evaluate
 from artde_gym.evaluation.provenance import provenance
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.evaluation.store import claim, write_atomically
+from artde_gym.kit import Harder
 from artde_gym.studies.frontier.axis import Axis, axis
 from artde_gym.studies.frontier.result import RECORD, Frontier
-from artde_gym.studies.frontier.standard import Harder, standard_test
+from artde_gym.studies.frontier.standard import standard_test
 
 TRACE_HZ = 10.0  # a frontier has hundreds of episodes; their traces are for a look at a fall, not for metrics
 LEVEL_COLUMNS = ["value", "controller", "episodes", "survived", "rate", "low", "high"]

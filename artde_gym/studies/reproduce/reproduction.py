@@ -23,33 +23,13 @@ from artde_gym.errors import OptionError, UnknownNameError, among
 from artde_gym.evaluation.evaluate import Update, evaluate
 from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.store import write_atomically
+from artde_gym.kit import ROBOTS, RobotKit
 from artde_gym.scenarios import scenario as find_scenario
 from artde_gym.studies.reproduce.claims import CLAIMS, judge
 
 ADAPTIVE, ABLATION = "artde", "tde+kd"
 TRACED = 3  # episodes of each cell that leave their signals: to look at; compressing all takes a minute or two
 GAIN = "robust_gain_mean"  # column of a law's mean c; with a suffix for each loop of a cascade, as its gains have
-
-
-@dataclasses.dataclass(frozen=True)
-class Selection:
-    """Scenarios and controllers of one robot, by name."""
-
-    scenarios: tuple[str, ...]
-    controllers: tuple[str, ...]
-
-
-ROBOTS: dict[str, Selection] = {
-    "biped": Selection(
-        ("S1", "S2", "S3", "S1-L4", "S2-L4", "S3-L4", "S1-GRF"),
-        ("tde", "atde", ADAPTIVE),
-    ),
-    "quadrotor": Selection(
-        ("Q1", "Q1-calm", "Q1-gale"),
-        ("tde", "atde", ADAPTIVE, "asmc", "pid", "geometric", "indi"),
-    ),
-}
-"""What is run where nothing else is asked for."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,15 +40,29 @@ class Reproduction:
     claims: pd.DataFrame
 
 
+def titles() -> list[str]:
+    """Return how users call the robots that have scenarios to reproduce."""
+    return [kit.title for kit in ROBOTS.values() if kit.reproduced[0]]
+
+
+def kit_of(title: str) -> RobotKit:
+    """Return the robot that users call so.
+
+    Raises:
+        UnknownNameError: if there is none with scenarios to reproduce.
+    """
+    if title not in titles():
+        raise UnknownNameError("robot", title, among(title, titles()))
+    return next(kit for kit in ROBOTS.values() if kit.title == title)
+
+
 def scenarios_of(robot: str, names: Sequence[str] | None = None) -> tuple[str, ...]:
-    """Those of the named scenarios in which a robot moves; all that it is reproduced in for None.
+    """Return those of the named scenarios in which a robot moves; all that it is reproduced in for None.
 
     Raises:
         UnknownNameError: for an unknown robot or scenario.
     """
-    if robot not in ROBOTS:
-        raise UnknownNameError("robot", robot, among(robot, ROBOTS))
-    own = ROBOTS[robot].scenarios
+    own, _ = kit_of(robot).reproduced
     environments = {find_scenario(name).env_id for name in own}
     return own if names is None else tuple(name for name in names if find_scenario(name).env_id in environments)
 
@@ -89,9 +83,9 @@ def reproduce(
     """Run a robot's scenarios with all its controllers and judge the claims made in them.
 
     Args:
-        robot: "biped" or "quadrotor".
+        robot: a robot's title, such as "biped" or "quadrotor".
         out: folder to store everything in; the same call continues an interrupted one.
-        scenarios: of this robot, in place of `ROBOTS`' ones.
+        scenarios: of this robot, in place of all that its kit names.
         controllers: likewise, without the ablation.
         ablation: whether to run it too; "artde" must be among the controllers then.
         episodes: seeded episodes of each controller in each scenario.
@@ -107,7 +101,7 @@ def reproduce(
     chosen = scenarios_of(robot, scenarios)
     if not chosen:
         raise OptionError("scenarios", scenarios, f"at least one of the {robot}'s")
-    names = list(ROBOTS[robot].controllers if controllers is None else controllers)
+    names = list(kit_of(robot).reproduced[1] if controllers is None else controllers)
     if ABLATION in names:
         raise OptionError("controllers", ABLATION, "other names; it is run by ablation=True, at gains of its own")
     if ablation and ADAPTIVE not in names:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 
-from artde_gym.robots.spec import Box, Link, RobotSpec
+from artde_gym.multibody.spec import Box, Link, RobotSpec
 
 
 def urdf(spec: RobotSpec) -> str:

@@ -14,7 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 from artde_gym.arrays import Array
-from artde_gym.robots.spec import Box, Link, RobotSpec, Vector
+from artde_gym.multibody.spec import Box, Link, RobotSpec, Vector
 
 MASS = 1.4 + 0.05 + 0.03  # kg: frame, computer, gripper
 INERTIA: Vector = (0.0125, 0.0125, 0.0225)  # kg m^2

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from artde_gym.arrays import Array
-from artde_gym.robots import q450 as robot
-from artde_gym.robots.lag import follow, lag_shares
+from artde_gym.multibody.lag import follow, lag_shares
+from artde_gym.robots.q450 import model as robot
 
 
 class Rotors:

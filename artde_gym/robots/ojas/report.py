@@ -3,25 +3,44 @@
 from __future__ import annotations
 
 import inspect
+import json
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from artde_gym.arrays import Array
+from artde_gym.multibody.dynamics import RigidBodyTree
 from artde_gym.palette import OTHERS, Look, looks
-from artde_gym.references.walking import walking_pattern
 from artde_gym.report.chart import Axis, Chart
+from artde_gym.report.diagram import Block, diagram
 from artde_gym.report.html import figure, paragraph
 from artde_gym.report.run import Episode, Signals
 from artde_gym.report.signals import add, over_time
-from artde_gym.robots.dynamics import RigidBodyTree
-from artde_gym.robots.ojas import ojas
+from artde_gym.robots.ojas.model import ojas
+from artde_gym.robots.ojas.walking import walking_pattern
 
 SHOWN = 10.0  # s of the walk, from its start
 SIDES: dict[str, Look] = {"left": OTHERS[3], "right": OTHERS[4]}
 BODY = {"centre of mass": OTHERS[2], **{f"{side} foot": look for side, look in SIDES.items()}}
 PERIOD = 0.001  # s, of the pattern in the environment
+
+
+_JOINTS: tuple[Block, ...] = (
+    (6, 30, 84, ("walking", "pattern")),
+    (140, 30, 140, ("u = qdd_ref + Kd ed", "+ Kp e + du")),
+    (330, 30, 84, ("Ojas,", "12 joints")),
+    (140, 120, 140, ("adaptation by |s|, |xi|", "of b0, b1 (or c)")),
+    (330, 120, 84, ("delay L:", "tau, a")),
+)
+_JOINT_WIRES = (
+    ("M90 53H140", "q_ref", 115, 47),
+    ("M280 53H330", "tau", 305, 47),
+    ("M190 120V76", "du", 178, 102),
+    ("M372 76V120", "q, qd", 390, 102),
+    ("M330 152H280", "xi", 305, 147),
+    ("M330 134H305V100H250V76", "tau - m_bar a", 268, 113),
+)
 
 
 def figures(episode: Episode) -> list[str]:
@@ -35,7 +54,19 @@ def pattern_of(kwargs: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in kwargs.items() if name in known}
 
 
-def reference(arguments: Mapping[str, Any]) -> list[str]:
+def loop() -> str:
+    """Return the block diagram of one loop for all joints."""
+    name = "Block diagram: reference, law with adaptation, robot, and the estimate of one sample ago"
+    return diagram(name, 190, _JOINTS, _JOINT_WIRES)
+
+
+def reference(kwargs: Mapping[str, Any]) -> dict[str, list[str]]:
+    """Return the loop, and the walking pattern of an environment's arguments."""
+    arguments = pattern_of(kwargs)
+    return {"ojas": [loop()], f"pattern {json.dumps(arguments)}": _pattern(arguments)}
+
+
+def _pattern(arguments: Mapping[str, Any]) -> list[str]:
     """What the pattern wants of the centre of mass, the feet and the joints."""
     pattern = walking_pattern(**arguments, period=PERIOD)
     part = slice(0, round(SHOWN / PERIOD), 10)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from artde_gym.arrays import Array
 from artde_gym.palette import looks
 from artde_gym.report.chart import Axis, Chart, height_of
+from artde_gym.report.diagram import Block, diagram
 from artde_gym.report.html import figure
 from artde_gym.report.run import Episode
 
@@ -17,6 +20,37 @@ WIDTH = 400
 AZIMUTH, ELEVATION = math.radians(-60.0), math.radians(28.0)  # of the eye, as seen from the middle
 GRID = 0.5  # m, of the floor
 STRIDE = 4  # of stored samples: a path needs fewer than a signal
+
+
+_CASCADE: tuple[Block, ...] = (
+    (6, 20, 84, ("infinity", "path")),
+    (140, 20, 140, ("position loop: tau_p =", "applied + m_bar (u - a)")),
+    (330, 20, 84, ("filter: R_d,", "w_d, alpha_d")),
+    (330, 120, 84, ("attitude", "loop: tau_q")),
+    (140, 120, 140, ("allocation to 4 rotors,", "with their limits")),
+    (6, 120, 84, ("Q450, load,", "wind")),
+)
+_CASCADE_WIRES = (
+    ("M90 43H140", "p_ref", 115, 37),
+    ("M280 43H330", "tau_p", 305, 37),
+    ("M385 66V120", "R_d", 400, 97),
+    ("M330 143H280", "u2..u4", 305, 137),
+    ("M140 143H90", "thrusts", 115, 137),
+    ("M345 66V94H235V120", "u1 = tau_p . R e3", 292, 88),
+    ("M48 166V200H372V166", "R, w, and the torques applied one L ago", 210, 195),
+    ("M48 120V94H185V66", "p, v, force one L ago", 112, 88),
+)
+
+
+def loop() -> str:
+    """Return the block diagram of a position loop outside and an attitude loop inside."""
+    name = "Block diagram of the cascade: position loop, desired attitude, attitude loop, allocation, vehicle"
+    return diagram(name, 205, _CASCADE, _CASCADE_WIRES)
+
+
+def reference(_kwargs: Mapping[str, Any]) -> dict[str, list[str]]:
+    """Return the loop, the same for all arguments."""
+    return {"q450": [loop()]}
 
 
 def figures(episode: Episode) -> list[str]:

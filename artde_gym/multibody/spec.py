@@ -1,6 +1,6 @@
 """An engine-neutral description of a robot: links, joints, gears and actuators.
 
-URDF (Bullet), the rigid-body algebra of `artde_gym.robots.dynamics` and every other engine's
+URDF (Bullet), the rigid-body algebra of `artde_gym.multibody.dynamics` and every other engine's
 model are made from this one description, so that they cannot disagree.
 """
 

@@ -14,8 +14,8 @@ from __future__ import annotations
 import numpy as np
 
 from artde_gym.arrays import Array
-from artde_gym.robots.dynamics import RigidBodyTree
-from artde_gym.robots.spec import RobotSpec
+from artde_gym.multibody.dynamics import RigidBodyTree
+from artde_gym.multibody.spec import RobotSpec
 
 
 class Supported:

@@ -13,7 +13,7 @@ import math
 from typing import Literal
 
 from artde_gym.errors import OptionError
-from artde_gym.robots.spec import Box, Link, RobotSpec, Vector, box_link
+from artde_gym.multibody.spec import Box, Link, RobotSpec, Vector, box_link
 
 ActuatorInertia = Literal["rotor", "lumped", "none"]
 

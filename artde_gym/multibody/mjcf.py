@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 
-from artde_gym.robots.spec import Box, Link, RobotSpec
-from artde_gym.robots.urdf import numbers
+from artde_gym.multibody.spec import Box, Link, RobotSpec
+from artde_gym.multibody.urdf import numbers
 
 GROUND = "ground"
 PAYLOAD = "payload"

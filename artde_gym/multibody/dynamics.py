@@ -23,7 +23,7 @@ import numpy as np
 
 from artde_gym.arrays import Array
 from artde_gym.errors import RobotError
-from artde_gym.robots.spec import RobotSpec
+from artde_gym.multibody.spec import RobotSpec
 
 GRAVITY = 9.81  # m/s^2
 

@@ -9,17 +9,16 @@ from typing import Any, Literal, TypeVar, get_args
 
 import numpy as np
 
-from artde_gym.arguments import flag, word
+from artde_gym.arguments import flag, steps_per_period, word
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
-from artde_gym.envs.options import steps_per_period
 from artde_gym.layout import Field, Layout
-from artde_gym.references.walking import WalkingPattern, hip_height_above_ankle, walking_pattern
-from artde_gym.robots import ojas as robot
-from artde_gym.robots.dynamics import GRAVITY
-from artde_gym.robots.ojas import ActuatorInertia, ojas
-from artde_gym.robots.spec import RobotSpec, Vector
-from artde_gym.robots.support import Supported
+from artde_gym.multibody.dynamics import GRAVITY
+from artde_gym.multibody.spec import RobotSpec, Vector
+from artde_gym.multibody.support import Supported
+from artde_gym.robots.ojas import model as robot
+from artde_gym.robots.ojas.model import ActuatorInertia, ojas
+from artde_gym.robots.ojas.walking import WalkingPattern, hip_height_above_ankle, walking_pattern
 from artde_gym.sim.engine import World
 from artde_gym.tracking import Effort, Tracked, Tracking
 

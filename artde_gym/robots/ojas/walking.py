@@ -28,9 +28,9 @@ from scipy.linalg import solve_banded
 from artde_gym.arguments import number
 from artde_gym.arrays import Array
 from artde_gym.errors import OptionError
-from artde_gym.robots import ojas as robot
-from artde_gym.robots.dynamics import GRAVITY, RigidBodyTree
-from artde_gym.robots.leg_ik import leg_angles
+from artde_gym.multibody.dynamics import GRAVITY, RigidBodyTree
+from artde_gym.robots.ojas import model as robot
+from artde_gym.robots.ojas.leg_ik import leg_angles
 
 STAND = 2.0  # s, before the first step and after the last one
 DOUBLE_SUPPORT = 0.2  # share of a step

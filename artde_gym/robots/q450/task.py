@@ -14,10 +14,10 @@ from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.ground_effect import thrust_gain
 from artde_gym.disturbances.wind import GRID
 from artde_gym.layout import Field, Layout
-from artde_gym.references.infinity import START, infinity_path
-from artde_gym.robots import q450 as robot
-from artde_gym.robots.dynamics import GRAVITY
-from artde_gym.robots.spec import Vector
+from artde_gym.multibody.dynamics import GRAVITY
+from artde_gym.multibody.spec import Vector
+from artde_gym.robots.q450 import model as robot
+from artde_gym.robots.q450.infinity import START, infinity_path
 from artde_gym.tracking import Effort, Fields, Tracked, Tracking
 
 STREAMS = 3  # of noise in an episode: wind, motion capture, sensor noise
@@ -125,7 +125,7 @@ four rotors, each of which is limited to 0 to {robot.MAX_THRUST:g} N and follows
 ground: the time-delay estimate needs just that. What policies do not see: payload, wind, pushes, ground effect.
 
 ## Reference
-The infinity-shaped path of `artde_gym.references.infinity`: loop 1 until 33 s, rest until 37 s, loop 2 until 70 s;
+The infinity-shaped path of `artde_gym.robots.q450.infinity`: loop 1 until 33 s, rest until 37 s, loop 2 until 70 s;
 yaw 0.
 
 ## Reward

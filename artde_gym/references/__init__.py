@@ -1,1 +1,0 @@
-"""References to follow: pure functions of time, without an engine."""

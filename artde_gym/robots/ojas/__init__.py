@@ -1,0 +1,1 @@
+"""Ojas, the biped."""

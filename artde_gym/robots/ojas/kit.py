@@ -1,0 +1,101 @@
+"""What a plug-in says of Ojas: its environments, scenarios and frontiers, and how it is shown.
+
+Each scenario varies by a kick on the torso of 0.5 to 5 N for 0.2 s at 1 s from any side, friction of 0.7 to 0.9, and a
+payload up to 1 cm off its place.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from artde_gym.kit import Environment, FrontierTest, Motion, Push, Range, RobotKit, random_push
+from artde_gym.robots.ojas.model import ojas
+from artde_gym.robots.ojas.pushes import ARM_PUSH, CHEST_PUSH
+from artde_gym.scenarios import Scenario
+
+_WALK, _PUSH = "BipedWalk-Payload-v0", "BipedPush-v0"
+_KICK = {
+    "body": "torso",
+    "magnitude": {"uniform": [0.5, 5.0]},
+    "direction": [{"normal": [0.0, 1.0]}, {"normal": [0.0, 1.0]}, 0.0],
+    "start": 1.0,
+    "duration": 0.2,
+}
+_VARIATION: dict[str, Any] = {"push": [_KICK], "friction": {"uniform": [0.7, 0.9]}}
+_PAYLOAD: dict[str, Any] = {
+    "mass": 1.3,
+    "position": [{"uniform": [-0.01, 0.01]}, {"uniform": [-0.01, 0.01]}, {"uniform": [0.15, 0.17]}],
+}
+_SLOW = {"control_period": 0.004}
+_S2 = {"payload": _PAYLOAD, **_VARIATION}
+_S3 = {**_S2, "push": [_KICK, CHEST_PUSH, ARM_PUSH]}
+_GRF = {**_VARIATION, "grf_pulse": 60.0}
+_PHASES = ((0.0, 28.0), (28.0, 37.0), (37.0, math.inf))
+
+_SCENARIOS = (
+    Scenario("S1", _WALK, {}, _VARIATION, "walk without payload, L = 1 ms", "S1"),
+    Scenario("S2", _WALK, {}, _S2, "walk with a payload of 1.3 kg, L = 1 ms", "S2"),
+    Scenario("S3", _PUSH, {}, _S3, "S2 with pushes of 10 N at 28 s (chest) and 37 s (left arm)", "S3", _PHASES),
+    Scenario("S1-L4", _WALK, _SLOW, _VARIATION, "S1 at L = 4 ms: a quarter of the joint stiffness", "S1"),
+    Scenario("S2-L4", _WALK, _SLOW, _S2, "S2 at L = 4 ms", "S2"),
+    Scenario("S3-L4", _PUSH, _SLOW, _S3, "S3 at L = 4 ms", "S3", _PHASES),
+    Scenario("S1-GRF", _WALK, {}, _GRF, "S1 with the thesis' extra ground force", "S1"),
+)
+
+_STRIDE = (5.0, 7.0)  # s, two steps of steady walking at 1 s a step
+_FRONTIER = FrontierTest(
+    scenario="S2",
+    duration=12.0,
+    when=_STRIDE,
+    repeated={
+        "push": [random_push("chest", _STRIDE)],
+        "actuator_loss": [{"joint": "all"}],
+        "initial_pose": [{"joint": "all"}],
+    },
+    time_step=0.001,
+    ranges={
+        "push.magnitude": Range(0.0, 60.0, 2.0),
+        "payload.mass": Range(0.5, 5.0, 0.25),
+        "grf_pulse.magnitude": Range(0.0, 200.0, 10.0),
+        "friction.coefficient": Range(0.05, 0.8, 0.05, "smaller"),
+        "slope.pitch_deg": Range(0.0, 10.0, 0.5),
+        "slope.roll_deg": Range(0.0, 10.0, 0.5),
+        "sensor_noise.position": Range(0.0, 0.01, 0.00025),
+        "sensor_noise.velocity": Range(0.0, 1.0, 0.025),
+        "encoder_bits.bits": Range(8.0, 20.0, 1.0, "smaller"),
+        "torque_delay.samples": Range(0.0, 10.0, 1.0),
+        "motor_lag.time_constant": Range(0.0, 0.02, 0.001),
+        "actuator_loss.factor": Range(0.0, 1.0, 0.05, "smaller"),
+        "mass_error.factor": Range(1.0, 2.0, 0.05),
+        "control_period": Range(0.001, 0.02, 0.001),
+        "speed": Range(0.0, 0.25, 0.01),
+    },
+)
+
+KIT = RobotKit(
+    name="ojas",
+    title="biped",
+    model=ojas,
+    joints=ojas().actuated,
+    environments=(
+        Environment(
+            _WALK,
+            "artde_gym.envs.biped_walk:BipedWalkPayloadEnv",
+            "artde_gym.envs.biped_walk:BipedWalkPayloadVectorEnv",
+            main=("S1", "S2", "S1-L4", "S2-L4"),
+        ),
+        Environment(
+            _PUSH,
+            "artde_gym.envs.biped_push:BipedPushEnv",
+            "artde_gym.envs.biped_push:BipedPushVectorEnv",
+        ),
+    ),
+    capabilities=frozenset({"actuators", "encoders", "feet", "joints", "mass", "payload", "sensors", "sites"}),
+    scenarios=_SCENARIOS,
+    reproduced=(("S1", "S2", "S3", "S1-L4", "S2-L4", "S3-L4", "S1-GRF"), ("tde", "atde", "artde")),
+    frontier=_FRONTIER,
+    motion=Motion("walk", 6.0, 2.0),
+    push=Push("chest", 20.0),
+    report="artde_gym.robots.ojas.report",
+)

@@ -1,0 +1,1 @@
+"""The Q450, a quadrotor."""
