@@ -22,6 +22,7 @@ from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.rollout import Episode, Policy, run_episode
 from artde_gym.evaluation.scenarios import Scenario
 from artde_gym.evaluation.scenarios import scenario as find_scenario
+from artde_gym.evaluation.seeds import episode_seed, with_exact_seeds
 from artde_gym.evaluation.store import Store
 from artde_gym.evaluation.workers import run_here, run_parallel
 from artde_gym.registration import ControllerSpec, make_controller, register_spec, registered_controllers
@@ -192,15 +193,10 @@ def evaluate(
         runs.close()
     places = {(cell.name, name): i for i, (cell, name) in enumerate(itertools.product(cells, named))}
     rows = sorted(rows, key=lambda row: (row["episode"], places[row["scenario"], row["controller"]]))
-    result = Result(pd.DataFrame(rows), None if store is None else store.folder, complete)
+    result = Result(with_exact_seeds(pd.DataFrame(rows)), None if store is None else store.folder, complete)
     if store is not None and rows:
         store.finish(rows, result.summary())
     return result
-
-
-def episode_seed(seed: int, episode: int) -> int:
-    """Seed of one episode: independent streams for all pairs of numbers."""
-    return int(np.random.SeedSequence([seed, episode]).generate_state(1)[0])
 
 
 def chunks_of(episodes: int, size: int) -> list[range]:

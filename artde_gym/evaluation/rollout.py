@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
@@ -58,8 +59,8 @@ def run_episode(
     looks = diagnosed_every(plant, stride)
 
     observation, info = env.reset(seed=seed, options=options)
-    disturbances = info["disturbances"]
-    observations, diagnostics, told = [observation], [], [_told(plant, info)]
+    disturbances = copy.deepcopy(info["disturbances"])  # what is kept is a copy: policies write into theirs
+    observations, diagnostics, told = [np.array(observation)], [], [_told(plant, info)]
     state, episode_start = None, True
     terminated = truncated = False
     total = 0.0
@@ -68,10 +69,10 @@ def run_episode(
         episode_start = False
         count = len(observations)
         if diagnose is not None and (count - 1) % looks == 0:
-            diagnostics.append(diagnose(state))
+            diagnostics.append(copied(diagnose(state)))
         observation, reward, terminated, truncated, info = env.step(action)
         total += float(reward)
-        observations.append(observation)
+        observations.append(np.array(observation))
         if count % stride == 0:
             told.append(_told(plant, info))
         if on_progress is not None and count % report_every == 0:
@@ -130,6 +131,11 @@ def traces_of(period: float, fields: dict[str, Array], inside: dict[str, Array])
 def stack(samples: list[dict[str, Array]]) -> dict[str, Array]:
     """Samples of named arrays as named arrays of samples."""
     return {name: np.array([sample[name] for sample in samples]) for name in samples[0]} if samples else {}
+
+
+def copied(signals: Mapping[str, Any]) -> dict[str, Array]:
+    """Copy named arrays."""
+    return {name: np.array(values) for name, values in signals.items()}
 
 
 def _told(plant: Any, info: dict[str, Any]) -> dict[str, Array]:

@@ -22,7 +22,6 @@ from artde_gym.evaluation.evaluate import (
     Update,
     chunks_of,
     duration_of,
-    episode_seed,
     labels_of,
     policy_for,
     run_task,
@@ -30,6 +29,7 @@ from artde_gym.evaluation.evaluate import (
 )
 from artde_gym.evaluation.ray_workers import run_on_ray
 from artde_gym.evaluation.rollout import Episode
+from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.evaluation.sweep_design import Design, Point, design, read
 from artde_gym.evaluation.sweep_store import Key, SweepStore, read_sweep
 from artde_gym.evaluation.workers import Runs, run_here, run_parallel

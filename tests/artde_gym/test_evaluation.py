@@ -24,7 +24,8 @@ from artde_gym.envs import quadrotor_task
 from artde_gym.errors import ArtdeGymError, DisturbanceError, OptionError, StoreError, UnknownNameError
 from artde_gym.evaluation import SCENARIOS, Result, evaluate, reproduce, statistics, thesis
 from artde_gym.evaluation.console import print_result
-from artde_gym.evaluation.evaluate import Update, episode_seed
+from artde_gym.evaluation.evaluate import Update
+from artde_gym.evaluation.seeds import episode_seed
 from controllers import GainError
 
 SHORT: dict[str, Any] = {"duration": 0.4, "control_period": 0.004, "actuator_inertia": "lumped"}

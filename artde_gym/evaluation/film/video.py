@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artde_gym.errors import OptionError
-from artde_gym.evaluation.evaluate import cells_of, episode_seed, named_controllers
+from artde_gym.evaluation.evaluate import cells_of, named_controllers
 from artde_gym.evaluation.film import writer
 from artde_gym.evaluation.film.panels import panels
 from artde_gym.evaluation.film.shots import Shot, shots
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.evaluation.scenarios import SCENARIOS
+from artde_gym.evaluation.seeds import episode_seed
 
 HELD = 1.0  # s, for which the last picture is shown after everybody has ended
 
