@@ -97,7 +97,7 @@ def run_batch(
             on_progress(k * period)
 
     episodes = []
-    for i, row in enumerate(metrics.rows()):
+    for i, row in enumerate(metrics.rows(np.isin(np.arange(len(seeds)), list(reasons)))):
         traces: dict[str, Array] = {}
         if i < traced:
             seen, decided = int(steps[i]) // stride + 1, int(steps[i] - 1) // stride + 1

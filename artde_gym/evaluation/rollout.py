@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from artde_gym.evaluation.metrics import Metrics, Span, events_of
+from artde_gym.evaluation.metrics import Metrics, Span, events_of, payload_of
 
 Array = NDArray[Any]
 
@@ -85,7 +85,7 @@ def run_episode(
     metrics.add(0, _part(fields, np.s_[:last, None]), _part(inside, np.s_[:, None]))
     metrics.add(last, _part(fields, np.s_[last:, None]), None)  # nothing was decided there any more
     reason = info.get("fall_reason", "") if terminated else None
-    row = row_of(reason, info["time_s"], total, metrics.rows()[0], disturbances)
+    row = row_of(reason, info["time_s"], total, metrics.rows(np.array([bool(terminated)]))[0], disturbances)
     kept = slice(None, None, stride // looks)
     seen = _part(fields, slice(None, None, stride)) | stack(told)
     return Episode(row, traces_of(stride * period, seen, _part(inside, kept)))
@@ -98,9 +98,10 @@ def diagnosed_every(plant: Any, stride: int) -> int:
 
 def metrics_for(plant: Any, disturbances: Sequence[Mapping[str, Any]], phases: Sequence[Span]) -> Metrics:
     """Metrics of episodes in an environment, from the realised disturbances of each."""
-    masses = [plant.nominal_robot.mass + one.get("payload", {}).get("mass", 0.0) for one in disturbances]
+    masses = [plant.nominal_robot.mass * one.get("mass_error", {}).get("factor", 1.0) for one in disturbances]
+    payloads = [payload_of(one) for one in disturbances]
     events = [events_of(one) for one in disturbances]
-    return Metrics(plant.tracking, plant.observation_layout, plant.control_period, masses, events, phases)
+    return Metrics(plant.tracking, plant.observation_layout, plant.control_period, masses, events, phases, payloads)
 
 
 def row_of(
