@@ -68,14 +68,14 @@ def placed(disturbances: Mapping[str, Any], kind: str, name: str, value: Any) ->
     """
     given = disturbances.get(kind)
     if not KINDS[kind].repeated:
-        return {**disturbances, kind: {**_parameters(kind, given), name: value}}
+        return {**disturbances, kind: {**parameters_of(kind, given), name: value}}
     entries = [given] if isinstance(given, Mapping) else given
     if not (isinstance(entries, (list, tuple)) and entries and all(isinstance(entry, Mapping) for entry in entries)):
         raise OptionError("disturbances", given, f"with a list of at least one {kind!r}: it is varied")
     return {**disturbances, kind: [{**entry, name: value} for entry in entries]}
 
 
-def _parameters(kind: str, given: Any) -> dict[str, Any]:
+def parameters_of(kind: str, given: Any) -> dict[str, Any]:
     """A disturbance's parameters, also from the short form of a bare number or distribution."""
     if given is None:
         return {}

@@ -233,7 +233,7 @@ def test_folder_holds_what_the_documentation_says(tmp_path: Path) -> None:
     np.testing.assert_array_equal(table["rmse_deg_q3"], result.episodes["rmse_deg_q3"])  # to the last bit
     assert {"env", "scenario", "seed", "episode", "fell", "time_to_fall_s", "max_abs_error_deg_q6"} <= set(table)
     summary = pd.read_csv(folder / "summary.csv")
-    assert {"scenario", "controller", "metric", "mean", "low", "high", "n"} == set(summary)
+    assert {"scenario", "controller", "metric", "mean", "low", "high", "median", "n"} == set(summary)
     record = json.loads((folder / "summary.json").read_text())
     assert record["episodes"] == 4
     assert record["configuration"]["seed"] == 0
