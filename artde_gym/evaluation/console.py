@@ -63,7 +63,7 @@ def _print_paragraphs(verdicts: pd.DataFrame, console: Console) -> None:
     """Print one claim a paragraph: scenario and claim, then the other columns by name."""
     console.print(Text("\nClaims", style="italic"))
     for row in verdicts.to_dict(orient="records"):
-        words = {str(name): str(word) for name, word in row.items() if word}
+        words = {str(name): str(word) or "-" for name, word in row.items()}
         console.print()
         console.print(Text(f"{words.pop('scenario')}: {words.pop('claim')}", style="bold"))
         for name, word in words.items():

@@ -91,9 +91,7 @@ class Point:
         disturbances = kwargs.pop("disturbances", None)
         columns = {f"gains.{name}": _plain(value) for name, value in self.gains.items()}
         columns |= {f"env_kwargs.{name}": _plain(value) for name, value in kwargs.items()}
-        if disturbances is not None:
-            meant = canonical.disturbances(disturbances, self.cell.env_id)
-            columns["disturbances"] = json.dumps(meant, sort_keys=True)
+        columns["disturbances"] = None if disturbances is None else json.dumps(disturbances, sort_keys=True)
         return {name: value for name, value in columns.items() if value is not None}
 
 

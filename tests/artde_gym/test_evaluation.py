@@ -400,7 +400,8 @@ def test_a_recovery_that_never_came_is_counted() -> None:
     console = Console(record=True, width=100)
     print_result(Result(pd.DataFrame(rows)), console)
     text = console.export_text()
-    assert "1.50 (1 never)" in text
+    assert "2/3 (21..94 %)" in text
+    assert "2.00" in text  # the median, with never as the largest
     assert "0.2500" in text
 
 

@@ -59,9 +59,7 @@ def test_tune_refuses_a_controller_named_twice() -> None:
     ],
 )
 def test_spellings_of_one_case_are_one_case(path: str, values: list[Any]) -> None:
-    found = [design({**SCENARIO, "grid": {path: [value]}}).points[0] for value in values]
-    assert len({point.id for point in found}) == 1
-    assert len({point.columns.get("disturbances") for point in found}) == 1
+    assert len({design({**SCENARIO, "grid": {path: [value]}}).points[0].id for value in values}) == 1
     assert len(design({**SCENARIO, "grid": {path: values}}).points) == 1
 
 
