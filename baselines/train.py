@@ -86,10 +86,9 @@ class Trainer:
     def learn(self) -> None:
         """One interval, from fresh episodes."""
         run, model = self.run, self.model
-        words = np.random.SeedSequence([run.training.seed, self.number]).generate_state(2)
-        seed, env_seed = (int(word >> 1) for word in words)
-        set_random_seed(seed)
-        self.env.seed(env_seed)
+        words = np.random.SeedSequence([run.training.seed, self.number]).generate_state(2, np.uint64).tolist()
+        set_random_seed(words[0] % 2**32)  # NumPy's old generator takes no more
+        self.env.seed(words[1])
         self.env.set_options({"disturbances": run.task.training(self.level)})
         model._last_obs = None  # so that `learn` resets the environments
         watcher, began = _Watcher(self._report), time.perf_counter()

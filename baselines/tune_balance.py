@@ -60,7 +60,7 @@ def tune(training: Training, out: str | Path, on_progress: Callable[[Progress], 
             costs = told[generation]["costs"]
             steps = told[generation]["steps"]
         else:
-            seeds = np.random.SeedSequence([training.seed, generation]).generate_state(PUSHES).tolist()
+            seeds = np.random.SeedSequence([training.seed, generation]).generate_state(PUSHES, np.uint64).tolist()
             networks = [balance_network(gains, residual.features, residual.actions) for gains in candidates]
             costs, count = _judge(env, networks, seeds)
             steps += count

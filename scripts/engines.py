@@ -17,8 +17,8 @@ import pybullet as bullet
 
 import controllers
 from artde_gym.evaluation import Result, evaluate, statistics, thesis
-from artde_gym.evaluation.evaluate import episode_seed
 from artde_gym.evaluation.rollout import run_episode
+from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.scenarios import SCENARIOS
 
 ENGINES = ("bullet", "mujoco")

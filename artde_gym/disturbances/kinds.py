@@ -307,6 +307,17 @@ def page() -> str:
     return INTRODUCTION + "\n".join(lines)
 
 
+def parameters_of(kind: str, given: Any) -> dict[str, Any]:
+    """Return a disturbance's parameters, also from the short form of a bare number or distribution."""
+    if given is None:
+        return {}
+    scalar = KINDS[kind].scalar
+    names = {parameter.name for parameter in KINDS[kind].parameters}
+    if isinstance(given, Mapping) and (scalar is None or not names.isdisjoint(given)):
+        return dict(given)
+    return {str(scalar): given}
+
+
 def other_defaults(kind: Kind, parameter: Parameter) -> dict[str, Any]:
     """Return a parameter's defaults of robots that have another one than the kind."""
     path = f"{kind.name}.{parameter.name}"

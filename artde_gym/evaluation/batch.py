@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -13,6 +14,7 @@ from artde_gym.evaluation.rollout import (
     PROGRESS_INTERVAL,
     Episode,
     Policy,
+    copied,
     diagnosed_every,
     metrics_for,
     row_of,
@@ -55,7 +57,7 @@ def run_batch(
     split = env.observation_layout.split
 
     observation, info = env.reset(seed=list(seeds))
-    disturbances = list(info["disturbances"])
+    disturbances = copy.deepcopy(list(info["disturbances"]))  # what is kept is a copy: policies write into theirs
     metrics = metrics_for(env, disturbances, phases)
     live = np.ones(len(seeds), dtype=np.bool_)
     steps, total = np.zeros(len(seeds), dtype=np.int64), np.zeros(len(seeds))
@@ -69,10 +71,10 @@ def run_batch(
     insides: list[dict[str, Array]] = []
     state, episode_start, k = None, live, 0
     while live.any():
+        block.append(np.array(observation))
         action, state = policy.predict(observation, state=state, episode_start=episode_start, deterministic=True)
-        block.append(observation)
         if diagnose is not None and k % looks == 0:
-            insides.append(diagnose(state))
+            insides.append(copied(diagnose(state)))
             if traced and k % stride == 0:
                 diagnostics.append({name: values[:traced].copy() for name, values in insides[-1].items()})
         observation, reward, terminated, truncated, info = env.step(action)
@@ -95,7 +97,7 @@ def run_batch(
             on_progress(k * period)
 
     episodes = []
-    for i, row in enumerate(metrics.rows()):
+    for i, row in enumerate(metrics.rows(np.isin(np.arange(len(seeds)), list(reasons)))):
         traces: dict[str, Array] = {}
         if i < traced:
             seen, decided = int(steps[i]) // stride + 1, int(steps[i] - 1) // stride + 1

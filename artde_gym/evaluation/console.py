@@ -6,14 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
 import pandas as pd
 from rich import box
 from rich.console import Console, Group, RenderableType
+from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from artde_gym.arrays import Array
 from artde_gym.evaluation import statistics, thesis
 from artde_gym.evaluation.environments import tracking_of
 from artde_gym.evaluation.result import Result
@@ -27,6 +26,7 @@ REFERENCE = "artde"
 ALL = "all"  # axes together
 TOGETHER = 3  # columns of controllers, or of comparisons, that fit a terminal
 ACROSS = 4  # columns of axes that do
+NARROW = 110  # characters of a terminal, below which a table of claims is a ribbon of words
 WIDE = 6  # columns of controllers that do with a space on either side
 _VERDICTS = {"holds": "green", "does not hold": "red", "undecided": "yellow", "not measured": "dim"}
 
@@ -48,12 +48,27 @@ def print_result(result: Result, console: Console) -> None:
 
 def print_claims(verdicts: pd.DataFrame, console: Console) -> None:
     """Print the table of `artde_gym.studies.reproduce.claims.judge`, or of `confirm`."""
+    if console.width < NARROW:
+        _print_paragraphs(verdicts, console)
+        return
     table = _table(*verdicts.columns, title="Claims")
     for row in verdicts.itertuples(index=False, name=None):
         table.add_row(*(Text(word, style=_VERDICTS.get(word, "")) for word in row))
         table.add_section()
     console.print()
     console.print(table)
+
+
+def _print_paragraphs(verdicts: pd.DataFrame, console: Console) -> None:
+    """Print one claim a paragraph: scenario and claim, then the other columns by name."""
+    console.print(Text("\nClaims", style="italic"))
+    for row in verdicts.to_dict(orient="records"):
+        words = {str(name): str(word) or "-" for name, word in row.items()}
+        console.print()
+        console.print(Text(f"{words.pop('scenario')}: {words.pop('claim')}", style="bold"))
+        for name, word in words.items():
+            line = Text.assemble((f"{name}: ", "dim"), (word, _VERDICTS.get(word, "")))
+            console.print(Padding(line, (0, 0, 0, 2)))
 
 
 class _Tables:
@@ -136,7 +151,7 @@ class _Tables:
         return [table(self._controllers, []), *(table([], pair) for pair in pairs)]
 
     def _events(self, scenario: str, tracking: Tracking) -> list[Table]:
-        """Peak and recovery after each disturbance; a recovery that never came counts beside the mean of the others."""
+        """Peak and recovery after each disturbance; the median counts a recovery that never came as the longest."""
         unit, (text, digits) = tracking.errors[0].unit, UNITS[tracking.errors[0].unit]
         table = _table("after", "", title="after disturbances")
         table.collapse_padding = len(self._controllers) > WIDE
@@ -148,9 +163,9 @@ class _Tables:
             if not any(map(math.isfinite, peaks)):
                 continue
             table.add_row(event, f"peak ({text})", *(f"{peak:.{digits}f}" for peak in peaks))
-            column = f"recovery_time_s_{event}"
-            times = [self._result.values(scenario, name, column) for name in self._controllers]
-            table.add_row("", "recovery (s)", *map(_recovery, times))
+            back = [self._result.recovery(scenario, name, event) for name in self._controllers]
+            table.add_row("", "recovered", *(share_text(one.share) for one in back))
+            table.add_row("", "median (s)", *(time_text(one.median.value) for one in back))
         return [table] if table.row_count else []
 
 
@@ -210,10 +225,16 @@ def _number(value: float | None, digits: int) -> str:
     return "" if value is None else f"{value:.{digits}f}"
 
 
-def _recovery(times: Array) -> str:
-    never = int(np.isinf(times).sum())
-    mean = statistics.mean(times)
-    return (f"{mean.value:.2f}" if mean.n else "-") + (f" ({never} never)" if never else "")
+def share_text(share: statistics.Estimate) -> str:
+    """A share as a count with its interval: "18/20 (70..97 %)"."""
+    if not share.n:
+        return "unknown"
+    return f"{round(share.value * share.n)}/{share.n} ({100 * share.low:.0f}..{100 * share.high:.0f} %)"
+
+
+def time_text(time: float) -> str:
+    """A time (s) until something happens, which may be never."""
+    return "-" if math.isnan(time) else "never" if math.isinf(time) else f"{time:.2f}"
 
 
 def _percent(value: float) -> str:

@@ -7,7 +7,7 @@ import hashlib
 import itertools
 import json
 import pickle
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
@@ -15,11 +15,13 @@ import numpy as np
 import pandas as pd
 
 from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.evaluation import canonical
 from artde_gym.evaluation.batch import run_batch
 from artde_gym.evaluation.environments import Backend, single, tracking_of, vector
 from artde_gym.evaluation.metrics import Span
 from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.rollout import Episode, Policy, run_episode
+from artde_gym.evaluation.seeds import episode_seed, with_exact_seeds
 from artde_gym.evaluation.store import Store
 from artde_gym.evaluation.workers import run_here, run_parallel
 from artde_gym.registration import ControllerSpec, make_controller, register_spec, registered_controllers
@@ -192,15 +194,10 @@ def evaluate(
         runs.close()
     places = {(cell.name, name): i for i, (cell, name) in enumerate(itertools.product(cells, named))}
     rows = sorted(rows, key=lambda row: (row["episode"], places[row["scenario"], row["controller"]]))
-    result = Result(pd.DataFrame(rows), None if store is None else store.folder, complete)
+    result = Result(with_exact_seeds(pd.DataFrame(rows)), None if store is None else store.folder, complete)
     if store is not None and rows:
         store.finish(rows, result.summary())
     return result
-
-
-def episode_seed(seed: int, episode: int) -> int:
-    """Seed of one episode: independent streams for all pairs of numbers."""
-    return int(np.random.SeedSequence([seed, episode]).generate_state(1)[0])
 
 
 def chunks_of(episodes: int, size: int) -> list[range]:
@@ -210,8 +207,14 @@ def chunks_of(episodes: int, size: int) -> list[range]:
     return [range(first, stop) for first, stop in itertools.pairwise(edges)]
 
 
-def named_controllers(controllers: Any) -> dict[str, Policy | ControllerSpec]:
-    """Controllers by the name under which they are listed, names replaced by what they stand for."""
+def labelled(controllers: Any) -> dict[str, str | Policy]:
+    """Give each controller the name under which it is listed.
+
+    Raises:
+        OptionError: for no controller, a name that is no word, or one that comes twice.
+    """
+    if isinstance(controllers, str):
+        raise OptionError("controllers", controllers, "a list of names or policies")
     if isinstance(controllers, Mapping):
         pairs = list(controllers.items())
     else:
@@ -221,11 +224,29 @@ def named_controllers(controllers: Any) -> dict[str, Policy | ControllerSpec]:
         ]
     if not pairs:
         raise OptionError("controllers", controllers, "at least one")
+    for label, _ in pairs:
+        if not isinstance(label, str):
+            raise OptionError("name of a controller", label, "a word")
+    if again := twice(label for label, _ in pairs):
+        raise OptionError("controllers", again, "each name once; give a mapping to tell two of one name apart")
+    return dict(pairs)
+
+
+def twice(names: Iterable[str]) -> str | None:
+    """Find a name that comes twice, in whatever spelling."""
+    seen: set[str] = set()
+    for name in names:
+        if canonical.name(name) in seen:
+            return name
+        seen.add(canonical.name(name))
+    return None
+
+
+def named_controllers(controllers: Any) -> dict[str, Policy | ControllerSpec]:
+    """Controllers by the name under which they are listed, names replaced by what they stand for."""
     known = registered_controllers()
     named: dict[str, Policy | ControllerSpec] = {}
-    for label, item in pairs:
-        if label in named:
-            raise OptionError("controllers", label, "each name once; give a mapping to tell two of one name apart")
+    for label, item in labelled(controllers).items():
         if isinstance(item, str):
             if item not in known:
                 raise UnknownNameError("controller", item, among(item, known))
@@ -258,6 +279,8 @@ def cells_of(
     entries: list[Scenario] = [find_scenario(name) for name in ([names] if isinstance(names, str) else names)]
     if not entries:
         raise OptionError("scenario", names, "at least one name, or None")
+    if again := twice(entry.name for entry in entries):
+        raise OptionError("scenario", again, "each name once: its episodes would count twice")
     for entry in entries:
         if env_id not in (None, entry.env_id):
             raise OptionError(f"environment of scenario {entry.name!r}", env_id, repr(entry.env_id))

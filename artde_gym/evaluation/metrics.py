@@ -10,13 +10,16 @@ Per axis: `rmse_u_<axis>`, `max_abs_error_u_<axis>`, and for each effort `rms_<e
   value, as its size is the norm or the root mean square.
 - `<effort>_variation_<unit>_s`: mean over its components of sum |f_k - f_k-1|, a second.
 - `saturation`: share of samples with an actuator at its limit.
-- `energy_j`: integral of the power; `cost_of_transport`: energy / (m g distance), NaN below 0.1 m.
+- `energy_j`: integral of the power; `cost_of_transport`: energy / (g integral of the mass over the distance), the mass
+  being that of the robot with what it carries at the time; NaN below 0.1 m.
 - `tde_error_rms`, ...: root mean square of the error of time-delay estimation (rad/s^2, m/s^2).
 - `robust_gain_mean`, ...: mean of the law's robust gain c.
 - `peak_error_u_<event>`: largest size of the main error from the beginning of a push, or the payload's drop, until 2 s
   after its end.
 - `recovery_time_s_<event>`: time from the end of each push, or the drop, until the size of the main error stays for 1 s
-  in its band, or below its largest value in the 2 s before if that is more; infinite if it never does.
+  in its band, or below its largest value in the 2 s before if that is more; infinite if it never does, as in a fall
+  after the event's beginning. NaN where the episode ended too early to tell: before the event, less than 1 s after it,
+  or with an error that had stayed there for less than 1 s.
 """
 
 from __future__ import annotations
@@ -55,6 +58,12 @@ def events_of(disturbances: Mapping[str, Any]) -> dict[str, Span]:
     return events
 
 
+def payload_of(disturbances: Mapping[str, Any]) -> tuple[float, Span]:
+    """Mass (kg) of the payload, and (begin, end) (s) of when it is there, if it ever is."""
+    payload = disturbances.get("payload", {"mass": 0.0, "attach": 0.0, "drop": 0.0})
+    return payload["mass"], (payload["attach"], max(payload["attach"], payload["drop"]))
+
+
 class Metrics:
     """Metrics of n episodes that run side by side.
 
@@ -62,7 +71,8 @@ class Metrics:
         tracking: of the environment.
         layout: of its observations.
         period: of control (s).
-        masses: of the robot with its payload (kg), one an episode.
+        masses: of the robot alone (kg), one an episode.
+        payloads: mass (kg), and (begin, end) (s) of when it is there, one an episode; none at all if empty.
         events: see `events_of`, one mapping an episode.
         phases: (begin, end) (s) of parts that are measured one by one too.
     """
@@ -75,9 +85,13 @@ class Metrics:
         masses: Sequence[float],
         events: Sequence[Mapping[str, Span]],
         phases: Sequence[Span] = (),
+        payloads: Sequence[tuple[float, Span]] = (),
     ) -> None:
         self._tracking, self._period = tracking, period
         self._masses = np.array(masses, dtype=np.float64)
+        loads = payloads or [(0.0, (0.0, 0.0))] * len(masses)
+        self._loads = np.array([mass for mass, _ in loads])
+        self._carried = np.array([[_sample(time, period) for time in span] for _, span in loads]).T
         box, part = layout.box(), layout[tracking.limited]
         near = tracking.near * (box.high - box.low)[part]
         self._limits = box.low[part] + near, box.high[part] - near
@@ -91,7 +105,7 @@ class Metrics:
         self._size, self._sigmas = _Squares(n), {column: _Squares(n) for column in tracking.tde_errors}
         self._means = {column: _Mean(n) for column in tracking.means}
         self._variations = [_Variation(n) for _ in tracking.efforts]
-        self._iae, self._itae, self._saturated, self._energy, self._distance = np.zeros((5, n))
+        self._iae, self._itae, self._saturated, self._energy, self._distance, self._carrying = np.zeros((6, n))
         names = dict.fromkeys(name for one in events for name in one)
         never = (np.inf, np.inf)
         self._events = {name: _Event([one.get(name, never) for one in events], tracking.band, period) for name in names}
@@ -130,13 +144,21 @@ class Metrics:
         self._saturated = _added(self._saturated, np.any((values <= low) | (values >= high), axis=-1), live)
         self._energy = _added(self._energy, tracking.power(fields)[acted], live)
         if tracking.speed is not None:
-            self._distance = _added(self._distance, tracking.speed(fields), live)
+            speed = tracking.speed(fields)
+            self._distance = _added(self._distance, speed, live)
+            self._carrying = _added(self._carrying, self._mass(start, samples) * speed, live)
         for column, name in tracking.tde_errors.items():
             if diagnostics is not None and name in diagnostics:
                 self._sigmas[column].add(diagnostics[name], live)
         for column, name in tracking.means.items():
             if diagnostics is not None and name in diagnostics:
                 self._means[column].add(diagnostics[name], live)
+
+    def _mass(self, start: int, samples: int) -> Array:
+        """Mass of the robot with what it carries (kg), (samples, n)."""
+        k = np.arange(start, start + samples)[:, None]
+        attached, dropped = self._carried
+        return self._masses + self._loads * ((attached <= k) & (k < dropped))
 
     def _add_main(self, error: Array, start: int, live: Mask | None) -> None:
         size = np.sqrt(np.square(error).sum(axis=-1) if self._tracking.norm else np.square(error).mean(axis=-1))
@@ -148,8 +170,9 @@ class Metrics:
         for event in self._events.values():
             event.add(size, start, live)
 
-    def rows(self) -> list[dict[str, Any]]:
-        """The columns at the top, one row an episode."""
+    def rows(self, fell: Mask | None = None) -> list[dict[str, Any]]:
+        """The columns at the top, one row an episode; `fell` (n,) says which of them ended in a fall, None for none."""
+        fell = np.zeros(len(self._count), np.bool_) if fell is None else fell
         tracking, period = self._tracking, self._period
         main = tracking.errors[0]
         unit, scale = main.unit, main.scale
@@ -163,7 +186,7 @@ class Metrics:
                 for axis, i in effort.axes.items():
                     columns[f"rms_{effort.name}_{effort.unit}_{prefix}{axis}"] = squares.rms[:, i]
         for name, event in self._events.items():
-            columns[f"recovery_time_s_{name}"] = event.recovery_time(self._count)
+            columns[f"recovery_time_s_{name}"] = event.recovery_time(self._count, fell)
             columns[f"peak_error_{unit}_{name}"] = scale * event.peak
         columns[f"rmse_{unit}"] = scale * self._size.rms[:, 0]
         columns[f"iae_{unit}_s"] = scale * period * self._iae
@@ -174,8 +197,8 @@ class Metrics:
         columns["saturation"] = self._saturated / acted
         columns["energy_j"] = energy = period * self._energy
         if tracking.speed is not None:
-            far = np.where(period * self._distance > NEAR, period * self._distance, np.nan)
-            columns["cost_of_transport"] = energy / (self._masses * GRAVITY * far)
+            carried = np.where(period * self._distance > NEAR, period * self._carrying, np.nan)
+            columns["cost_of_transport"] = energy / (GRAVITY * carried)
         columns |= {column: squares.rms_of_all for column, squares in self._sigmas.items()}
         columns |= {column: mean.value for column, mean in self._means.items()}
         return [
@@ -277,13 +300,12 @@ class _Event:
         self._recovered = np.where(here, recovered, self._recovered)
         self._outside = outside[-1]
 
-    def recovery_time(self, count: NDArray[np.int64]) -> Array:
-        """(n,) (s), for episodes of so many samples; where the rest is shorter than the hold, all of it must hold."""
-        after = count - self._end
-        holds = (self._recovered < 0) & (count - 1 - self._outside >= np.minimum(after, self._hold))
-        recovered = np.where(holds, self._outside + 1, self._recovered)
-        time = np.where(recovered < 0, np.inf, self._period * (recovered - self._end))
-        return np.where(after > 0, time, np.nan)
+    def recovery_time(self, count: NDArray[np.int64], fell: Mask) -> Array:
+        """(n,) (s), for episodes of so many samples, some of which ended in a fall; NaN where it is not known."""
+        last = count - 1
+        never = np.where(fell, last >= self._begin, (self._outside == last) & (count - self._end >= self._hold))
+        time = np.where(never, np.inf, np.nan)
+        return np.where(self._recovered < 0, time, self._period * (self._recovered - self._end))
 
 
 def _error(tracked: Tracked, fields: Fields, diagnostics: Fields | None) -> Array | None:

@@ -4,17 +4,35 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from artde_gym.arrays import Array
-from artde_gym.errors import UnknownNameError, among
+from artde_gym.errors import OptionError, UnknownNameError, among
 from artde_gym.evaluation import statistics
+from artde_gym.evaluation.pairing import DRAWN, episode_key, paired
+from artde_gym.evaluation.wide_table import WideTable
 
 _NOT_METRICS = ("seed", "episode", "fell", "duration_s")
-_OF_ALL = ("fell", "time_to_fall_s", "reward")
-"""Metrics that mean something for an episode that ended in a fall too."""
+_OF_ALL = ("fell", "reward")
+"""Metrics that mean something for an episode that ended in a fall too, as times until something happens do."""
+RECOVERY = "recovery_time_s_"
+RECOVERED = "recovered_"
+_TIME_TO_FALL = "time_to_fall_s"
+
+
+class Recovery(NamedTuple):
+    """How often and how soon the error was back after a disturbance.
+
+    Attributes:
+        share: of the episodes in which it is known, with Wilson's interval.
+        median: of the times (s), never as the largest.
+    """
+
+    share: statistics.Estimate
+    median: statistics.Estimate
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,11 +43,23 @@ class Result:
         episodes: one row an episode and controller; see `artde_gym.evaluation.metrics` for the columns.
         folder: where they are stored, if they are.
         complete: False if the evaluation was interrupted.
+
+    Raises:
+        OptionError: if an episode is there twice, which would count it as two.
     """
 
     episodes: pd.DataFrame
     folder: Path | None = None
     complete: bool = True
+
+    def __post_init__(self) -> None:
+        if self.episodes.empty:
+            return
+        twice = self.episodes.duplicated(["scenario", "controller", *episode_key(self.episodes)])
+        if twice.any():
+            first = self.episodes[twice].iloc[0]
+            which = f"{first['controller']} in {first['scenario']} with the seed {first['seed']} twice"
+            raise OptionError("episodes", which, "each scenario, controller, seed and drawn disturbances once")
 
     @property
     def controllers(self) -> list[str]:
@@ -47,7 +77,7 @@ class Result:
     def metrics(self) -> list[str]:
         """Columns that a comparison makes sense for."""
         numbers = self.episodes.select_dtypes("number").columns
-        return [name for name in numbers if name not in _NOT_METRICS and not name.startswith("disturbance.")]
+        return [name for name in numbers if name not in _NOT_METRICS and not name.startswith(DRAWN)]
 
     def rows(self, scenario: str, controller: str) -> pd.DataFrame:
         """The episodes of one controller in one scenario, indexed by their number."""
@@ -64,32 +94,43 @@ class Result:
         fell = self.rows(scenario, controller)["fell"].to_numpy(dtype=np.bool_)
         return int(fell.sum()), statistics.rate(int(fell.sum()), len(fell))
 
-    def summary(self) -> pd.DataFrame:
-        """Mean, 95 % interval and number of episodes, indexed by scenario, controller and metric.
+    def recovery(self, scenario: str, controller: str, event: str) -> Recovery:
+        """Judge the recovery of one controller after an event, e.g. "push0", in one scenario."""
+        times = self.values(scenario, controller, RECOVERY + event)
+        known = times[~np.isnan(times)]
+        return Recovery(statistics.rate(int(np.isfinite(known).sum()), len(known)), statistics.median(known))
 
-        `fall_rate` has Wilson's interval, everything else a bootstrap one. Metrics of tracking cover fallen episodes up
-        to the fall.
+    def summary(self) -> pd.DataFrame:
+        """Mean, 95 % interval, median and number of episodes, indexed by scenario, controller and metric.
+
+        `fall_rate` and the share `recovered_<event>` have Wilson's interval, other means a bootstrap one. Times until
+        something happens (`recovery_time_s_<event>`, `time_to_fall_s`) have no mean: never counts as the largest of
+        them, and the interval is the median's. Metrics of tracking cover fallen episodes up to the fall.
         """
         lines = []
         for scenario in self.scenarios:
             for controller in self.controllers:
                 rows = self.rows(scenario, controller)
-                estimates = {"fall_rate": self.falls(scenario, controller)[1]}
-                estimates.update({metric: statistics.mean(rows[metric]) for metric in self.metrics})
-                lines += [(scenario, controller, metric, *estimate) for metric, estimate in estimates.items()]
-        columns = ["scenario", "controller", "metric", "mean", "low", "high", "n"]
-        return pd.DataFrame(lines, columns=columns).set_index(columns[:3])
+                fell = self.falls(scenario, controller)[1]
+                lines.append((scenario, controller, "fall_rate", *fell[:3], rows["fell"].median(), fell.n))
+                for metric in self.metrics:
+                    lines += [(scenario, controller, *line) for line in _summarized(rows, metric)]
+        columns = ["scenario", "controller", "metric", "mean", "low", "high", "median", "n"]
+        return WideTable(lines, columns=columns).set_index(columns[:3])
 
     def pairs(self, scenario: str, first: str, second: str, metric: str) -> tuple[Array, Array]:
-        """The metric's finite values of two controllers on the same seeds; see `compare` for which seeds."""
-        return _pairs(self.rows(scenario, first), self.rows(scenario, second), metric)
+        """The metric's values of two controllers on the same seeds; see `compare` for which seeds."""
+        return _comparable(*paired(self.rows(scenario, first), self.rows(scenario, second)), metric)
 
     def compare(self, first: str, second: str) -> pd.DataFrame:
-        """Paired differences first - second on the same seeds, indexed by scenario and metric.
+        """Paired differences first - second, indexed by scenario and metric.
 
-        Columns: means of both, their `difference` with its 95 % bootstrap interval `low`, `high`, `percent` (difference
-        of the means relative to second), `win_probability` (share of pairs in which first is smaller) and `pairs`.
-        Metrics of tracking use the pairs in which nobody fell: an error up to a fall is no error of a walk.
+        A pair is two episodes of the same seed in which the same was drawn. Columns: means of both, their `difference`
+        with its 95 % bootstrap interval `low`, `high`, `percent` (difference of the means relative to second),
+        `win_probability` (share of pairs in which first is smaller) and `pairs`. Metrics of tracking use the pairs in
+        which nobody fell: an error up to a fall is no error of a walk. Times until something happens
+        (`recovery_time_s_<event>`, `time_to_fall_s`) count as the largest where it never does: both columns hold
+        medians, and there is no difference; `recovered_<event>` compares the shares.
 
         Raises:
             UnknownNameError: for a controller that was not evaluated.
@@ -99,24 +140,66 @@ class Result:
                 raise UnknownNameError("controller", name, among(name, self.controllers))
         lines = []
         for scenario in self.scenarios:
-            mine, theirs = (self.rows(scenario, name) for name in (first, second))
+            mine, theirs = paired(*(self.rows(scenario, name) for name in (first, second)))
             for metric in ("fell", *self.metrics):
-                a, b = _pairs(mine, theirs, metric)
-                difference = statistics.mean(a - b)
-                mean_a, mean_b = (float(side.mean()) if len(side) else np.nan for side in (a, b))
-                percent = 100 * difference.value / mean_b if mean_b else np.nan
+                a, b = _comparable(mine, theirs, metric)
+                if not _is_time(metric):
+                    lines.append((scenario, metric, *_difference(a, b)))
+                    continue
+                if metric.startswith(RECOVERY):
+                    shares = _difference(np.isfinite(a).astype(np.float64), np.isfinite(b).astype(np.float64))
+                    lines.append((scenario, RECOVERED + metric.removeprefix(RECOVERY), *shares))
+                medians = (statistics.median(side).value for side in (a, b))
                 win = statistics.win_probability(a, b)
-                lines.append((scenario, metric, mean_a, mean_b, *difference[:3], percent, win, difference.n))
+                lines.append((scenario, metric, *medians, *[np.nan] * 4, win, len(a)))
         columns = ["scenario", "metric", first, second, "difference", "low", "high"]
         columns += ["percent", "win_probability", "pairs"]
-        return pd.DataFrame(lines, columns=columns).set_index(["scenario", "metric"])
+        return WideTable(lines, columns=columns).set_index(["scenario", "metric"])
 
 
-def _pairs(mine: pd.DataFrame, theirs: pd.DataFrame, metric: str) -> tuple[Array, Array]:
-    both = mine.index.intersection(theirs.index)
-    mine, theirs = mine.loc[both], theirs.loc[both]
-    a, b = (rows[metric].to_numpy(dtype=np.float64) for rows in (mine, theirs))
+def _is_time(metric: str) -> bool:
+    """Tell a time until something happens, which may be never."""
+    return metric == _TIME_TO_FALL or metric.startswith(RECOVERY)
+
+
+def _values(rows: pd.DataFrame, metric: str) -> Array:
+    """A metric's values; a fall that never came is at infinity."""
+    values = rows[metric].to_numpy(dtype=np.float64)
+    return np.where(np.isnan(values), np.inf, values) if metric == _TIME_TO_FALL else values
+
+
+def _summarized(rows: pd.DataFrame, metric: str) -> list[tuple[str, float, float, float, float, int]]:
+    """Lines of a summary: metric, mean, interval, median, number."""
+    values = _values(rows, metric)
+    if not _is_time(metric):
+        mean = statistics.mean(values)
+        return [(metric, *mean[:3], statistics.median(values[np.isfinite(values)]).value, mean.n)]
+    middle = statistics.median(values)
+    lines = [(metric, np.nan, middle.low, middle.high, middle.value, middle.n)]
+    if metric.startswith(RECOVERY):
+        back = np.isfinite(values[~np.isnan(values)])
+        share = statistics.rate(int(back.sum()), len(back))
+        half = float(np.median(back)) if len(back) else np.nan
+        lines.insert(0, (RECOVERED + metric.removeprefix(RECOVERY), *share[:3], half, share.n))
+    return lines
+
+
+def _difference(a: Array, b: Array) -> tuple[float, ...]:
+    """Columns of a comparison of means."""
+    difference = statistics.mean(a - b)
+    mean_a, mean_b = (float(side.mean()) if len(side) else np.nan for side in (a, b))
+    percent = 100 * difference.value / mean_b if mean_b else np.nan
+    return mean_a, mean_b, *difference[:3], percent, statistics.win_probability(a, b), difference.n
+
+
+def _comparable(mine: pd.DataFrame, theirs: pd.DataFrame, metric: str) -> tuple[Array, Array]:
+    """The values of those pairs that can be compared."""
+    a, b = (_values(rows, metric) for rows in (mine, theirs))
+    if _is_time(metric):
+        used = ~(np.isnan(a) | np.isnan(b))
+        return a[used], b[used]
     used = np.isfinite(a) & np.isfinite(b)
     if metric not in _OF_ALL:
-        used &= ~(mine["fell"] | theirs["fell"]).to_numpy(dtype=np.bool_)
+        fallen = [rows["fell"].to_numpy(dtype=np.bool_) for rows in (mine, theirs)]
+        used &= ~(fallen[0] | fallen[1])
     return a[used], b[used]

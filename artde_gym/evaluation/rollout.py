@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from artde_gym.evaluation.metrics import Metrics, Span, events_of
+from artde_gym.evaluation.metrics import Metrics, Span, events_of, payload_of
 
 Array = NDArray[Any]
 
@@ -58,8 +59,8 @@ def run_episode(
     looks = diagnosed_every(plant, stride)
 
     observation, info = env.reset(seed=seed, options=options)
-    disturbances = info["disturbances"]
-    observations, diagnostics, told = [observation], [], [_told(plant, info)]
+    disturbances = copy.deepcopy(info["disturbances"])  # what is kept is a copy: policies write into theirs
+    observations, diagnostics, told = [np.array(observation)], [], [_told(plant, info)]
     state, episode_start = None, True
     terminated = truncated = False
     total = 0.0
@@ -68,10 +69,10 @@ def run_episode(
         episode_start = False
         count = len(observations)
         if diagnose is not None and (count - 1) % looks == 0:
-            diagnostics.append(diagnose(state))
+            diagnostics.append(copied(diagnose(state)))
         observation, reward, terminated, truncated, info = env.step(action)
         total += float(reward)
-        observations.append(observation)
+        observations.append(np.array(observation))
         if count % stride == 0:
             told.append(_told(plant, info))
         if on_progress is not None and count % report_every == 0:
@@ -84,7 +85,7 @@ def run_episode(
     metrics.add(0, _part(fields, np.s_[:last, None]), _part(inside, np.s_[:, None]))
     metrics.add(last, _part(fields, np.s_[last:, None]), None)  # nothing was decided there any more
     reason = info.get("fall_reason", "") if terminated else None
-    row = row_of(reason, info["time_s"], total, metrics.rows()[0], disturbances)
+    row = row_of(reason, info["time_s"], total, metrics.rows(np.array([bool(terminated)]))[0], disturbances)
     kept = slice(None, None, stride // looks)
     seen = _part(fields, slice(None, None, stride)) | stack(told)
     return Episode(row, traces_of(stride * period, seen, _part(inside, kept)))
@@ -97,9 +98,10 @@ def diagnosed_every(plant: Any, stride: int) -> int:
 
 def metrics_for(plant: Any, disturbances: Sequence[Mapping[str, Any]], phases: Sequence[Span]) -> Metrics:
     """Metrics of episodes in an environment, from the realised disturbances of each."""
-    masses = [plant.nominal_robot.mass + one.get("payload", {}).get("mass", 0.0) for one in disturbances]
+    masses = [plant.nominal_robot.mass * one.get("mass_error", {}).get("factor", 1.0) for one in disturbances]
+    payloads = [payload_of(one) for one in disturbances]
     events = [events_of(one) for one in disturbances]
-    return Metrics(plant.tracking, plant.observation_layout, plant.control_period, masses, events, phases)
+    return Metrics(plant.tracking, plant.observation_layout, plant.control_period, masses, events, phases, payloads)
 
 
 def row_of(
@@ -130,6 +132,11 @@ def traces_of(period: float, fields: dict[str, Array], inside: dict[str, Array])
 def stack(samples: list[dict[str, Array]]) -> dict[str, Array]:
     """Samples of named arrays as named arrays of samples."""
     return {name: np.array([sample[name] for sample in samples]) for name in samples[0]} if samples else {}
+
+
+def copied(signals: Mapping[str, Any]) -> dict[str, Array]:
+    """Copy named arrays."""
+    return {name: np.array(values) for name, values in signals.items()}
 
 
 def _told(plant: Any, info: dict[str, Any]) -> dict[str, Array]:

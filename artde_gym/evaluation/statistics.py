@@ -39,6 +39,21 @@ def mean(values: ArrayLike) -> Estimate:
     return _central_limit(finite, center)
 
 
+def median(values: ArrayLike) -> Estimate:
+    """Median with the exact interval of order statistics; infinite values count as the largest, NaN is left out.
+
+    Fewer than six values say too little of it: the interval is NaN.
+    """
+    array = np.asarray(values, dtype=np.float64)
+    known = np.sort(array[~np.isnan(array)])
+    count = len(known)
+    if not count:
+        return Estimate(np.nan, np.nan, np.nan, 0)
+    rank = int(stats.binom.ppf((1 - CONFIDENCE) / 2, count, 0.5))
+    low, high = (known[rank - 1], known[count - rank]) if rank else (np.nan, np.nan)
+    return Estimate(float(np.median(known)), float(low), float(high), count)
+
+
 def improvement(ours: ArrayLike, theirs: ArrayLike) -> Estimate:
     """By how many percent the mean of ours is below that of theirs, for paired values; intervals as of `mean`."""
     pairs = np.array([ours, theirs], dtype=np.float64).reshape(2, -1)
@@ -83,9 +98,9 @@ def rate(successes: int, trials: int) -> Estimate:
 
 
 def win_probability(first: ArrayLike, second: ArrayLike) -> float:
-    """Share of pairs in which `first` is smaller, ties counting one half."""
-    difference = np.asarray(first, dtype=np.float64) - np.asarray(second, dtype=np.float64)
-    return float(np.mean((difference < 0) + 0.5 * (difference == 0))) if difference.size else float("nan")
+    """Share of pairs in which `first` is smaller, ties counting one half; infinite values are the largest."""
+    a, b = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
+    return float(np.mean((a < b) + 0.5 * (a == b))) if a.size else float("nan")
 
 
 def _finite(values: ArrayLike) -> Array:

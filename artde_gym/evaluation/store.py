@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from artde_gym.arguments import file_name, reading
 from artde_gym.errors import StoreError
 from artde_gym.evaluation.provenance import provenance
+from artde_gym.evaluation.seeds import episode_seed, with_exact_seeds
 
 TABLE = "episodes.csv"
 KEY = ("scenario", "controller", "episode")
@@ -101,6 +102,9 @@ class Store:
                 raise StoreError(TABLE, str(path), f"{_UNDAMAGED} (it has a {column} {strange[0]!r})")
         rows = [{str(key): value for key, value in row.items()} for row in frame.to_dict(orient="records")]
         for row in rows:
+            if row["seed"] != episode_seed(wanted["seed"], row["episode"]):
+                raise StoreError(TABLE, str(path), f"{_UNDAMAGED} (episode {row['episode']} has another seed)")
+        for row in rows:
             row["fall_reason"] = row["fall_reason"] if isinstance(row.get("fall_reason"), str) else ""
         if path.stat().st_size != len(whole.encode()):
             write_atomically(path, lambda file: file.write(whole.encode()))
@@ -141,7 +145,9 @@ def read_episodes(folder: Path) -> tuple[str, pd.DataFrame]:
             raise ValueError(f"words among the numbers of {', '.join(words)}")
         if frame.duplicated(list(KEY)).any():
             raise ValueError("an episode twice")
-    return whole, frame
+        if (frame["seed"].to_numpy() < 0).any():
+            raise ValueError("a seed below zero")
+    return whole, with_exact_seeds(frame)
 
 
 def claim(folder: Path, record: str, configuration: Mapping[str, Any]) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from artde_gym.evaluation import statistics, thesis
-from artde_gym.evaluation.console import ALL, REFERENCE, UNITS, measured
+from artde_gym.evaluation.console import ALL, REFERENCE, UNITS, measured, share_text, time_text
 from artde_gym.evaluation.statistics import Estimate
 from artde_gym.palette import looks
 from artde_gym.report.chart import Axis, Chart
@@ -98,19 +98,19 @@ def events(run: Run, scenario: str) -> str:
     for event in (name.removeprefix(peak) for name in result.metrics if name.startswith(peak)):
         for name in result.controllers:
             peaks = result.values(scenario, name, peak + event)
-            times = result.values(scenario, name, f"recovery_time_s_{event}")
             reached = int(np.isfinite(peaks).sum())
             if not reached:
                 continue
-            height, back = statistics.mean(peaks), statistics.mean(times)
-            never = int(np.isinf(times).sum())
+            height, back = statistics.mean(peaks), result.recovery(scenario, name, event)
+            unknown = reached - back.share.n
             rows.append([
                 event,
                 name,
                 Cell(f"{reached} of {len(peaks)}", reached),
                 Cell(_text(height, digits), height.value),
-                Cell(_text(back, 2), back.value if back.n else None),
-                Cell(str(never), never),
+                Cell(share_text(back.share), back.share.value if back.share.n else None),
+                Cell(time_text(back.median.value), back.median.value if math.isfinite(back.median.value) else None),
+                Cell(str(unknown), unknown),
             ])  # fmt: skip
     if not rows:
         return ""
@@ -119,8 +119,9 @@ def events(run: Run, scenario: str) -> str:
         "controller",
         "episodes that reached it",
         f"peak error ({text})",
-        "recovery (s)",
-        "never recovered",
+        "recovered",
+        "median recovery (s)",
+        "unknown, it ended too early",
     ]
     return table(f"{scenario}: after pushes and drops (95 % intervals)", columns, rows)
 

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artde_gym.errors import OptionError
-from artde_gym.evaluation.evaluate import cells_of, episode_seed, named_controllers
+from artde_gym.evaluation.evaluate import cells_of, named_controllers
 from artde_gym.evaluation.rollout import Policy
+from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.scenarios import SCENARIOS
 from artde_gym.video import writer
 from artde_gym.video.frames import Shot, shots

@@ -23,7 +23,8 @@ from artde_gym.cli import app
 from artde_gym.errors import ArtdeGymError, DisturbanceError, OptionError, StoreError, UnknownNameError
 from artde_gym.evaluation import Result, evaluate, statistics, thesis
 from artde_gym.evaluation.console import print_result
-from artde_gym.evaluation.evaluate import Update, episode_seed
+from artde_gym.evaluation.evaluate import Update
+from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.robots.q450 import task as quadrotor_task
 from artde_gym.scenarios import SCENARIOS
 from artde_gym.studies import reproduce
@@ -234,7 +235,7 @@ def test_folder_holds_what_the_documentation_says(tmp_path: Path) -> None:
     np.testing.assert_array_equal(table["rmse_deg_q3"], result.episodes["rmse_deg_q3"])  # to the last bit
     assert {"env", "scenario", "seed", "episode", "fell", "time_to_fall_s", "max_abs_error_deg_q6"} <= set(table)
     summary = pd.read_csv(folder / "summary.csv")
-    assert {"scenario", "controller", "metric", "mean", "low", "high", "n"} == set(summary)
+    assert {"scenario", "controller", "metric", "mean", "low", "high", "median", "n"} == set(summary)
     record = json.loads((folder / "summary.json").read_text())
     assert record["episodes"] == 4
     assert record["configuration"]["seed"] == 0
@@ -401,7 +402,8 @@ def test_a_recovery_that_never_came_is_counted() -> None:
     console = Console(record=True, width=100)
     print_result(Result(pd.DataFrame(rows)), console)
     text = console.export_text()
-    assert "1.50 (1 never)" in text
+    assert "2/3 (21..94 %)" in text
+    assert "2.00" in text  # the median, with never as the largest
     assert "0.2500" in text
 
 

@@ -117,13 +117,15 @@ def test_recovery_and_peak_of_a_push() -> None:
     assert row()["peak_error_deg_push0"] == pytest.approx(3.0)
     error[400] = np.radians(2.0)  # a relapse within the second that it has to hold
     assert row()["recovery_time_s_push0"] == pytest.approx(1.81)
-    assert row(440)["recovery_time_s_push0"] == np.inf  # the rest is too short to say that it held
+    assert np.isnan(row(440)["recovery_time_s_push0"])  # the rest is too short to say that it held
+    assert row(401)["recovery_time_s_push0"] == np.inf  # it ends outside
     error[430] = np.radians(9.0)  # later than 2 s after the push: not of the push
     assert row()["peak_error_deg_push0"] == pytest.approx(3.0)
     error[100] = np.radians(2.5)  # as large before
     assert row()["recovery_time_s_push0"] == pytest.approx(0.31)
     error[201:] = 0.0
-    assert row(270)["recovery_time_s_push0"] == 0  # half a second is all there is
+    assert np.isnan(row(270)["recovery_time_s_push0"])  # half a second is all there is
+    assert row(330)["recovery_time_s_push0"] == 0
     error[201:] = np.radians(4.0)
     assert row()["recovery_time_s_push0"] == np.inf
     assert np.isnan(row(150)["recovery_time_s_push0"])

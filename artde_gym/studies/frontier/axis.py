@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from artde_gym.disturbances import KINDS
+from artde_gym.disturbances.kinds import parameters_of
 from artde_gym.errors import OptionError, UnknownNameError, among
 from artde_gym.evaluation.environments import arguments_of, robot_of
 from artde_gym.kit import Harder
@@ -69,22 +70,11 @@ def placed(disturbances: Mapping[str, Any], kind: str, name: str, value: Any) ->
     """
     given = disturbances.get(kind)
     if not KINDS[kind].repeated:
-        return {**disturbances, kind: {**_parameters(kind, given), name: value}}
+        return {**disturbances, kind: {**parameters_of(kind, given), name: value}}
     entries = [given] if isinstance(given, Mapping) else given
     if not (isinstance(entries, (list, tuple)) and entries and all(isinstance(entry, Mapping) for entry in entries)):
         raise OptionError("disturbances", given, f"with a list of at least one {kind!r}: it is varied")
     return {**disturbances, kind: [{**entry, name: value} for entry in entries]}
-
-
-def _parameters(kind: str, given: Any) -> dict[str, Any]:
-    """A disturbance's parameters, also from the short form of a bare number or distribution."""
-    if given is None:
-        return {}
-    scalar = KINDS[kind].scalar
-    names = {parameter.name for parameter in KINDS[kind].parameters}
-    if isinstance(given, Mapping) and (scalar is None or not names.isdisjoint(given)):
-        return dict(given)
-    return {str(scalar): given}
 
 
 def axis(

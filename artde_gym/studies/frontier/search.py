@@ -37,7 +37,7 @@ import pandas as pd
 from artde_gym.errors import OptionError, UnknownNameError, among
 from artde_gym.evaluation import statistics
 from artde_gym.evaluation.environments import Backend, arguments_of
-from artde_gym.evaluation.evaluate import CUSTOM, Update, evaluate
+from artde_gym.evaluation.evaluate import CUSTOM, Update, evaluate, labelled
 from artde_gym.evaluation.provenance import provenance
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.evaluation.store import claim, write_atomically
@@ -105,7 +105,7 @@ def frontier(
     """
     if not (isinstance(survival, (int, float)) and 0 < survival <= 1):
         raise OptionError("survival", survival, "above 0 up to 1")
-    named = _named(controllers)
+    named = labelled(controllers)
     gains = {name: dict(values) for name, values in (gains or {}).items()}
     for name in gains:
         if name not in named:
@@ -265,23 +265,6 @@ def _summary(varied: Axis, name: str, rows: list[dict[str, Any]], survival: floa
         for level in (below, above)
     ]
     return (name, relation, value, *ends, *rates[0], *rates[1])
-
-
-def _named(controllers: Any) -> dict[str, str | Policy]:
-    """Controllers by the name under which `evaluate` will list them."""
-    if isinstance(controllers, Mapping):
-        return dict(controllers)
-    if isinstance(controllers, str):
-        raise OptionError("controllers", controllers, "a list of names or policies")
-    named: dict[str, str | Policy] = {}
-    for item in controllers:
-        label = item if isinstance(item, str) else getattr(item, "name", type(item).__name__)
-        if label in named:
-            raise OptionError("controllers", label, "each name once; give a mapping to tell two of one name apart")
-        named[label] = item
-    if not named:
-        raise OptionError("controllers", controllers, "at least one")
-    return named
 
 
 def _arguments(env_id: str, backend: Backend, varied: Axis, given: Mapping[str, Any]) -> dict[str, Any]:

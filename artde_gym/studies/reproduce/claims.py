@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from artde_gym.evaluation import statistics, thesis
+from artde_gym.evaluation.pairing import paired_across
 from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.statistics import Estimate
 
@@ -97,11 +98,9 @@ def repeats(scenario: str, other: str, metric: str, axes: Sequence[str], most: f
         for name in (scenario, other):
             if missing := _missing(result, name, ("artde",)):
                 return missing
-        first, second = (_upright(result, name, "artde") for name in (scenario, other))
-        shared = first.index.intersection(second.index)
+        first, second = paired_across(*(_upright(result, name, "artde") for name in (scenario, other)))
         estimates = {
-            axis: statistics.improvement(first.loc[shared, f"{metric}_{axis}"], second.loc[shared, f"{metric}_{axis}"])
-            for axis in axes
+            axis: statistics.improvement(first[f"{metric}_{axis}"], second[f"{metric}_{axis}"]) for axis in axes
         }
         axis, worst = max(estimates.items(), key=lambda item: np.nan_to_num(abs(item[1].value), nan=-1.0))
         if worst.n == 0:

@@ -13,8 +13,9 @@
         disturbances.payload.mass: {uniform: [0.5, 2.0]}
 
 A path is one of the fixed names, or one value inside: `gains.<controller>.<gain>`, `env_kwargs.<argument>`,
-`disturbances.<kind>` or `disturbances.<kind>.<parameter>`. Cells that come out the same count once: gains of a
-controller that a cell does not run change nothing in it. Draw i depends on the seed, i and the path alone: more draws,
+`disturbances.<kind>` or `disturbances.<kind>.<parameter>`. Cells that come out the same count once, however they are
+written (`1` and `1.0`, a payload of `1` and of `{mass: 1}`, an argument that has its default): gains of a controller
+that a cell does not run change nothing in it. Draw i depends on the seed, i and the path alone: more draws,
 or more paths, leave it as it was, and every combination of the grid meets the same draws.
 """
 
@@ -37,6 +38,7 @@ import numpy as np
 
 from artde_gym.disturbances import KINDS
 from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.evaluation import canonical
 from artde_gym.evaluation.environments import Backend
 from artde_gym.evaluation.evaluate import Cell, cells_of, identity_of
 from artde_gym.registration import ControllerSpec, registered_controllers
@@ -295,7 +297,8 @@ def _point(settings: Mapping[str, Any], backend: Backend, names: set[Any]) -> Po
             raise UnknownNameError("gains", name, among(name, [str(one) for one in names if one is not None]))
     (cell,) = cells_of(settings["env"], settings["scenario"], settings["env_kwargs"], settings["disturbances"])
     gains, seed, spec = settings["gains"].get(controller, {}), settings["seed"], known[controller]
-    decides = [*cell, controller, identity_of(spec), gains, seed, backend]
+    means = cell._replace(kwargs=canonical.arguments(cell.kwargs, cell.env_id, backend))
+    decides = [*means, controller, identity_of(spec), canonical.numbers(gains), seed, backend]
     digest = hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
     return Point(cell, controller, spec, gains, seed, digest[:16])
 
@@ -355,5 +358,5 @@ def _is_whole(value: Any) -> bool:
 def _plain(value: Any) -> Any:
     """A value as a column holds it: numbers as float64, lists and mappings as JSON."""
     if isinstance(value, (list, dict)):
-        return json.dumps(value, sort_keys=True)
+        return json.dumps(canonical.numbers(value), sort_keys=True)
     return value

@@ -21,13 +21,13 @@ from artde_gym.evaluation.evaluate import (
     Update,
     chunks_of,
     duration_of,
-    episode_seed,
     labels_of,
     policy_for,
     run_task,
     tried,
 )
 from artde_gym.evaluation.rollout import Episode
+from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.evaluation.workers import Runs, run_here, run_parallel
 from artde_gym.studies.sweep import parquet
 from artde_gym.studies.sweep.design import Design, Point, design, read

@@ -3,8 +3,8 @@
 The schema, version `SCHEMA`, is the same for all files of a sweep. Columns in front: `cell` (hash of all that makes a
 cell), `controller`, `env`, `scenario`, `seed`, `episode`. Then, in alphabetical order, what else makes the cell
 (`gains.<gain>`, `env_kwargs.<argument>`, `disturbances` as JSON), the columns of `artde_gym.evaluation.metrics` and the
-realised disturbances (`disturbance.payload.mass`, ...). Numbers are float64, but for `seed` and `episode` (int64);
-lists and mappings are JSON. What an episode has no value for is null, never NaN.
+realised disturbances (`disturbance.payload.mass`, ...). Numbers are float64, but for `seed` (uint64) and `episode`
+(int64); lists and mappings are JSON. What an episode has no value for is null, never NaN.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from typing import Any
 
 from artde_gym.errors import OptionError, StoreError
 
-SCHEMA = 1
-LABELS = {"cell": "text", "controller": "text", "env": "text", "scenario": "text", "seed": "whole", "episode": "whole"}
+SCHEMA = 2
+LABELS = {"cell": "text", "controller": "text", "env": "text", "scenario": "text", "seed": "seed", "episode": "whole"}
 Types = dict[str, str]
-"""Column -> "number", "text" or "switch", or "whole" for two of `LABELS`."""
+"""Column -> "number", "text" or "switch", or "seed" and "whole" for one of `LABELS` each."""
 
 _VERSION, _DIGEST = "artde_gym.schema", b"artde_gym.sha256"
 _ZEROS = b"0" * 64
@@ -130,8 +130,8 @@ def _with_digest(data: bytes, digest: bytes) -> bytes:
     return data[:at] + digest + data[at + len(digest) :]
 
 
-_ARROW = {"text": "string", "number": "float64", "switch": "bool_", "whole": "int64"}
-_NAMES = {"string": "text", "double": "number", "bool": "switch", "int64": "whole"}
+_ARROW = {"text": "string", "number": "float64", "switch": "bool_", "whole": "int64", "seed": "uint64"}
+_NAMES = {"string": "text", "double": "number", "bool": "switch", "int64": "whole", "uint64": "seed"}
 
 
 def _type(name: str, value: Any) -> str:

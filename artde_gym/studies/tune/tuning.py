@@ -110,6 +110,9 @@ def tune(
         raise OptionError("controllers", controllers, "a list of names")
     if len(set(controllers)) < len(controllers):
         raise OptionError("controllers", controllers, "each name once")
+    compared = {label: name for name in controllers for label in (name, name + TUNED)}
+    if len(compared) < 2 * len(controllers):
+        raise OptionError("controllers", controllers, f"names that differ by more than {TUNED!r}")
     proposer = _Proposer(seed)
     env_id = env_id or (DEFAULT_ENVIRONMENT if scenario is None else find_scenario(scenario).env_id)
     error = tracking_of(env_id).errors[0]
@@ -155,7 +158,6 @@ def tune(
         if folder is not None:
             folder.write(rows)
     best = _best(rows)
-    compared = {label: name for name in controllers for label in (name, name + TUNED)}
     tuned = {name + TUNED: best[name] for name in controllers}
     place = {} if folder is None else {"out": folder.path / "held-out"}
     result = run("held-out", compared, tuned, episodes=held_out, seed=seed + 1, **place)

@@ -1,0 +1,66 @@
+"""One spelling for what means the same, so that cases are told apart by their meaning."""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Mapping
+from typing import Any
+
+from artde_gym.disturbances import KINDS
+from artde_gym.disturbances.kinds import parameters_of
+from artde_gym.errors import ArtdeGymError
+from artde_gym.evaluation.environments import Backend, arguments_of, ours, robot_of
+
+EXACT = 2**53
+"""Whole numbers below it are floats without rounding."""
+
+
+def name(text: str) -> str:
+    """Write a name without surrounding space, in one of Unicode's forms."""
+    return unicodedata.normalize("NFC", text.strip())
+
+
+def numbers(value: Any) -> Any:
+    """Write whole numbers as such, in mappings and lists too: 1.0 is 1."""
+    if isinstance(value, Mapping):
+        return {key: numbers(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [numbers(item) for item in value]
+    whole = isinstance(value, float) and abs(value) < EXACT and value == int(value)
+    return int(value) if whole else value
+
+
+def disturbances(given: Mapping[str, Any], env_id: str) -> dict[str, Any]:
+    """Write disturbances in full, with all defaults; those that no grammar knows stay as they are."""
+    robot = robot_of(env_id) if env_id in ours() else None
+    written = {kind: _entries(kind, value, robot) if kind in KINDS else value for kind, value in given.items()}
+    return {kind: numbers(value) for kind, value in written.items() if value != []}
+
+
+def arguments(given: Mapping[str, Any], env_id: str, backend: Backend) -> dict[str, Any]:
+    """Write an environment's arguments without those that have their defaults, its disturbances in full."""
+    try:
+        known = arguments_of(env_id, backend) if env_id in ours() else {}
+    except ArtdeGymError:
+        known = {}
+    if isinstance(given.get("disturbances"), Mapping):
+        given = {**given, "disturbances": disturbances(given["disturbances"], env_id)}
+    return {key: numbers(value) for key, value in given.items() if key not in known or _differs(value, known[key])}
+
+
+def _differs(value: Any, argument: Any) -> bool:
+    default = argument.default
+    return type(numbers(value)) is not type(numbers(default)) or numbers(value) != numbers(default)
+
+
+def _entries(kind: str, given: Any, robot: str | None) -> Any:
+    if not KINDS[kind].repeated:
+        return _full(kind, given, robot)
+    entries = [given] if isinstance(given, Mapping) else given
+    return [_full(kind, entry, robot) for entry in entries] if isinstance(entries, (list, tuple)) else given
+
+
+def _full(kind: str, given: Any, robot: str | None) -> dict[str, Any]:
+    known = KINDS[kind]
+    defaults = {one.name: known.default_of(one, robot) for one in known.parameters if one.default is not None}
+    return {**defaults, **parameters_of(kind, given)}
