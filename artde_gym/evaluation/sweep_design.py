@@ -38,8 +38,9 @@ import numpy as np
 from artde_gym.disturbances import KINDS
 from artde_gym.errors import OptionError, UnknownNameError, among
 from artde_gym.evaluation.environments import Backend
-from artde_gym.evaluation.evaluate import Cell, cells_of, identity_of
+from artde_gym.evaluation.evaluate import Cell, cells_of
 from artde_gym.evaluation.frontier_axis import placed
+from artde_gym.evaluation.identity import identity_of
 from artde_gym.evaluation.scenarios import scenario as find_scenario
 from artde_gym.registration import ControllerSpec, registered_controllers
 
@@ -295,7 +296,7 @@ def _point(settings: Mapping[str, Any], backend: Backend, names: set[Any]) -> Po
             raise UnknownNameError("gains", name, among(name, [str(one) for one in names if one is not None]))
     (cell,) = cells_of(settings["env"], settings["scenario"], settings["env_kwargs"], settings["disturbances"])
     gains, seed, spec = settings["gains"].get(controller, {}), settings["seed"], known[controller]
-    decides = [*cell, controller, identity_of(spec), gains, seed, backend]
+    decides = [*cell, controller, identity_of(spec).value, gains, seed, backend]
     digest = hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
     return Point(cell, controller, spec, gains, seed, digest[:16])
 
