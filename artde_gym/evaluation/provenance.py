@@ -111,6 +111,11 @@ def source_hash() -> str:
     return found.hexdigest()
 
 
+def software() -> dict[str, str]:
+    """What must be equal for results to be so: versions of the decisive packages, and the source code's hash."""
+    return {**versions(DECISIVE), "source_sha256": source_hash()}
+
+
 def versions(packages: Iterable[str]) -> dict[str, str]:
     """Versions of those packages that are installed."""
     return {name: version for name in packages if (version := _version(name)) is not None}

@@ -17,6 +17,7 @@ from artde_gym import registration
 from artde_gym.errors import StoreError
 from artde_gym.evaluation import evaluate, frontier, reproduce, sweep, tune
 from artde_gym.evaluation.provenance import source_hash
+from artde_gym.evaluation.report import write_report
 from artde_gym.evaluation.scenarios import SCENARIOS
 
 QUADROTOR = "QuadInfinity-Payload-v0"
@@ -82,6 +83,8 @@ def test_results_of_other_software_are_gone_on_with_on_request_only(name, tmp_pa
     run(tmp_path)  # the newest counts
     (mixed,) = provenance_of(json.loads(file.read_text()))["mixed_with"]
     assert mixed["packages"]["numpy"] == "1.0"
+    if name == "evaluate":
+        assert "mixed with results of other software" in write_report(tmp_path).read_text()
 
 
 @pytest.mark.parametrize("name", ["evaluate", "sweep"])
