@@ -133,11 +133,11 @@ def evaluate(
     if traced is None:
         traced = episodes if backend == "single" else 0
     named = named_controllers(controllers)
-    gains = plain_gains(gains, named)
+    gains = checked_gains(gains, named)
     cells = cells_of(env_id, scenario, dict(env_kwargs or {}), disturbances)
     evidence = _try_out(backend, cells, named, gains)
     if workers > 1:
-        _check_picklable(named, gains)
+        check_picklable(named, gains)
 
     store = None
     if out is not None:
@@ -275,8 +275,8 @@ def cells_of(
     return cells
 
 
-def plain_gains(given: Any, named: Collection[str]) -> dict[str, dict[str, Any]]:
-    """Gains of named controllers, NumPy's values as numbers and lists of them.
+def checked_gains(given: Any, named: Collection[str]) -> dict[str, dict[str, Any]]:
+    """Gains of named controllers.
 
     Raises:
         OptionError, UnknownNameError: for anything but mappings, or a controller that is not among the named.
@@ -288,11 +288,7 @@ def plain_gains(given: Any, named: Collection[str]) -> dict[str, dict[str, Any]]
     for name in given or {}:
         if name not in named:
             raise UnknownNameError("gains", name, among(name, named))
-    return {name: {gain: _plain(value) for gain, value in gains.items()} for name, gains in (given or {}).items()}
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
+    return {name: dict(gains) for name, gains in (given or {}).items()}
 
 
 def _try_out(
@@ -310,7 +306,12 @@ def _try_out(
     return found
 
 
-def _check_picklable(named: Mapping[str, Any], gains: Mapping[str, dict[str, Any]]) -> None:
+def check_picklable(named: Mapping[str, Any], gains: Mapping[str, dict[str, Any]]) -> None:
+    """See that controllers can be sent to other processes.
+
+    Raises:
+        OptionError: if one cannot.
+    """
     for name, item in named.items():
         try:
             pickle.dumps((item, gains.get(name)))

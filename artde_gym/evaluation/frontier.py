@@ -36,7 +36,7 @@ import pandas as pd
 from artde_gym.errors import OptionError, among
 from artde_gym.evaluation import statistics
 from artde_gym.evaluation.environments import Backend, arguments_of
-from artde_gym.evaluation.evaluate import CUSTOM, Update, evaluate, plain_gains
+from artde_gym.evaluation.evaluate import CUSTOM, Update, checked_gains, evaluate
 from artde_gym.evaluation.frontier_axis import Axis, axis
 from artde_gym.evaluation.frontier_standard import Harder, standard_test
 from artde_gym.evaluation.lock import writes_folder
@@ -132,7 +132,7 @@ def frontier(
     if not (isinstance(survival, (int, float)) and 0 < survival <= 1):
         raise OptionError("survival", survival, "above 0 up to 1")
     named = _named(controllers)
-    gains = plain_gains(gains, named)
+    gains = checked_gains(gains, named)
     varied = axis(env_id, vary, low, high, tolerance, harder)
     arguments = _arguments(env_id, backend, varied, env_kwargs or {})
     if disturbances is None:

@@ -74,7 +74,7 @@ def behind(name: str, env_id: str, item: Any, policy: Any) -> dict[str, str]:
     if learned is not None:
         found[f"weights of {name} in {env_id}"] = learned.value
     if type(policy).__module__.split(".")[0] not in SOURCES:
-        with contextlib.suppress(OSError, TypeError):  # of a class that was typed at a prompt
+        with contextlib.suppress(OSError, TypeError, SyntaxError):  # typed at a prompt, or changed since
             found[f"code of {name}"] = hashlib.sha256(inspect.getsource(type(policy)).encode()).hexdigest()
     return found
 

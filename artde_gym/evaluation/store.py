@@ -183,19 +183,25 @@ def _parsed(column: list[str]) -> list[Any]:
 
 
 def plain_configuration(configuration: Mapping[str, Any]) -> dict[str, Any]:
-    """A configuration as JSON gives it back.
+    """A configuration as JSON gives it back, NumPy's values as numbers and lists of them.
 
     Raises:
         OptionError: if it holds a value that JSON cannot write.
     """
+    plain: dict[str, Any] = {}
     for field, value in configuration.items():
         try:
-            json.dumps(value)
+            plain[field] = json.loads(json.dumps(value, default=_from_numpy))
         except (TypeError, ValueError) as error:
-            raise OptionError(
-                field, value, f"values that JSON can write, to be stored in a folder ({error})"
-            ) from error
-    return json.loads(json.dumps(configuration))
+            allowed = f"values that JSON can write, to be stored in a folder ({error})"
+            raise OptionError(field, value, allowed) from error
+    return plain
+
+
+def _from_numpy(value: Any) -> Any:
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} is no type of JSON")
 
 
 def claim(folder: Path, record: str, configuration: Mapping[str, Any]) -> Mapping[str, Any] | None:

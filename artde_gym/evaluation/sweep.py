@@ -20,6 +20,7 @@ from artde_gym.evaluation.evaluate import (
     CHUNK,
     Task,
     Update,
+    check_picklable,
     chunks_of,
     duration_of,
     episode_seed,
@@ -102,6 +103,8 @@ def sweep(
         raise OptionError("address", address, "none without executor 'ray'")
     sweep_part.pyarrow()
     plan = design(read(given) if isinstance(given, (str, Path)) else given)
+    if workers > 1 or executor == "ray":
+        check_picklable({point.controller: point.spec for point in plan.points}, {})
     types = sweep_part.types_of(point.columns for point in plan.points)
     points = {f"{point.cell.name} [{i}]": point for i, point in enumerate(plan.points)}
     report = on_progress or (lambda *_: None)

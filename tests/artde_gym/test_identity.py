@@ -11,10 +11,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import artde_gym
 import baselines
 import controllers
-from artde_gym.errors import OptionError, StoreError, UnknownNameError
-from artde_gym.evaluation import evaluate
+from artde_gym import registration
+from artde_gym.errors import OptionError, StoreError
+from artde_gym.evaluation import evaluate, sweep
 from artde_gym.evaluation.identity import digest, identity_of
 from baselines.saved import SHIPPED
 
@@ -117,6 +119,20 @@ def test_a_policy_that_cannot_be_pickled_runs_in_one_process_and_is_refused_for_
         run(policy, None, workers=2)
 
 
+def test_a_registered_controller_that_cannot_be_pickled_is_refused_for_several_processes(tmp_path, monkeypatch):
+    monkeypatch.setattr(registration, "_controllers", registration.registered_controllers())
+    artde_gym.register_controller("lift", f"{__name__}:make_lift", hook=lambda: 1)
+    given = {"env": QUADROTOR, "controller": "lift", "disturbances": {}, "env_kwargs": {"duration": 0.15}}
+    for go in (
+        lambda: evaluate(["lift"], QUADROTOR, workers=2, out=tmp_path / "run"),
+        lambda: sweep(given, tmp_path / "run", workers=2),
+    ):
+        with pytest.raises(OptionError, match=r"controller 'lift'.*can be pickled.*workers=1"):
+            go()
+    assert not (tmp_path / "run").exists()
+    assert evaluate(["lift"], QUADROTOR, episodes=1, env_kwargs={"duration": 0.15}, out=tmp_path / "run").complete
+
+
 @pytest.mark.parametrize(
     "value", [np.float64(1.25), np.float32(1.25), np.array([1.25, 1.25, 1.5]), np.array(1.25), (1.25, 1.25, 1.5)]
 )
@@ -127,7 +143,7 @@ def test_numpy_values_are_gains_as_numbers_are(value, tmp_path):
             gains={"tde": {"k_p_p": gain}},
         ).episodes  # fmt: skip
 
-    plain = np.asarray(value).tolist()
+    plain = [float(part) for part in value] if np.ndim(value) else float(value)
     first = episodes(value, tmp_path)
     pd.testing.assert_frame_equal(episodes(plain, None), first, check_exact=True)
     assert len(episodes(plain, tmp_path)) == 1  # the same folder
@@ -140,22 +156,14 @@ def test_gains_that_are_no_mapping_are_refused(gains):
         evaluate(["tde"], QUADROTOR, gains=gains)
 
 
-def test_gains_that_json_cannot_write_are_refused_with_a_folder(tmp_path):
-    from artde_gym import register_controller, registration
-
-    before = registration.registered_controllers()
-    try:
-        register_controller("lift", f"{__name__}:make_lift")
-        given: dict[str, Any] = {"gains": {"lift": {"hook": len}}, "env_kwargs": {"duration": 0.15}, "episodes": 1}
-        assert evaluate(["lift"], QUADROTOR, **given).complete
-        with pytest.raises(OptionError, match=r"gains is .*JSON can write"):
-            evaluate(["lift"], QUADROTOR, out=tmp_path / "run", **given)
-    finally:
-        registration._controllers.clear()
-        registration._controllers.update(before)
+def test_gains_that_json_cannot_write_are_refused_with_a_folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(registration, "_controllers", registration.registered_controllers())
+    artde_gym.register_controller("lift", f"{__name__}:make_lift")
+    given: dict[str, Any] = {"gains": {"lift": {"hook": len}}, "env_kwargs": {"duration": 0.15}, "episodes": 1}
+    assert evaluate(["lift"], QUADROTOR, **given).complete
+    with pytest.raises(OptionError, match=r"gains is .*JSON can write"):
+        evaluate(["lift"], QUADROTOR, out=tmp_path / "run", **given)
     assert not (tmp_path / "run").exists()
-    with pytest.raises(UnknownNameError):
-        evaluate(["lift"], QUADROTOR)
 
 
 def make_lift(env: Any, hook: Any = None) -> Lift:

@@ -130,10 +130,12 @@ def test_of_many_that_come_and_go_one_alone_holds_the_folder(tmp_path):
     assert most == [1]
 
 
-@pytest.mark.parametrize("where", ["file", "file/inside"])
-def test_a_folder_that_cannot_be_one_is_refused_in_words(tmp_path, where):
+@pytest.mark.parametrize(
+    ("where", "words"), [("file", "something else"), ("file/inside", "something else"), ("x" * 300, "name too long")]
+)
+def test_a_folder_that_cannot_be_one_is_refused_in_words(tmp_path, where, words):
     (tmp_path / "file").write_text("dear")
-    with pytest.raises(StoreError, match="something else"):
+    with pytest.raises(StoreError, match=words):
         evaluate(["tde"], scenario="Q1", out=tmp_path / where)
 
 
