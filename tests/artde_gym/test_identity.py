@@ -15,8 +15,9 @@ import artde_gym
 import baselines
 import controllers
 from artde_gym import registration
-from artde_gym.errors import OptionError, StoreError
-from artde_gym.evaluation import evaluate, sweep
+from artde_gym.errors import OptionError, StoreError, UnknownNameError
+from artde_gym.evaluation import evaluate, frontier, sweep
+from artde_gym.evaluation.film import video
 from artde_gym.evaluation.identity import digest, identity_of
 from baselines.saved import SHIPPED
 
@@ -152,8 +153,18 @@ def test_numpy_values_are_gains_as_numbers_are(value, tmp_path):
 
 @pytest.mark.parametrize("gains", [[1], 1, {"tde": 3}, {"tde": [1]}, "tde"])
 def test_gains_that_are_no_mapping_are_refused(gains):
-    with pytest.raises(OptionError, match=r"gains is .*mapping"):
-        evaluate(["tde"], QUADROTOR, gains=gains)
+    for go in (
+        lambda: evaluate(["tde"], QUADROTOR, gains=gains),
+        lambda: frontier(["tde"], QUADROTOR, "wind.scale", gains=gains),
+        lambda: video(["tde"], "film.png", QUADROTOR, gains=gains),
+    ):
+        with pytest.raises(OptionError, match=r"gains is .*mapping"):
+            go()
+
+
+def test_gains_of_a_controller_that_is_not_shown_are_refused():
+    with pytest.raises(UnknownNameError, match="gains is 'artde'"):
+        video(["tde"], "film.png", QUADROTOR, gains={"artde": {}})
 
 
 def test_gains_that_json_cannot_write_are_refused_with_a_folder(tmp_path, monkeypatch):

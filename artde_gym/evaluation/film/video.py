@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artde_gym.errors import OptionError
-from artde_gym.evaluation.evaluate import cells_of, episode_seed, named_controllers
+from artde_gym.evaluation.evaluate import cells_of, checked_gains, episode_seed, named_controllers
 from artde_gym.evaluation.film import writer
 from artde_gym.evaluation.film.panels import panels
 from artde_gym.evaluation.film.shots import Shot, shots
@@ -75,6 +75,7 @@ def video(
         raise OptionError("columns", columns, "a whole number >= 1")
     writer.check(out)
     named = named_controllers(controllers)
+    gains = checked_gains(gains, named)
     (cell,) = cells_of(env_id, scenario, dict(env_kwargs or {}), disturbances)
     fps = writer.frame_rate(out, fps)
     films = {
@@ -82,7 +83,7 @@ def video(
             cell.env_id,
             cell.kwargs,
             policy,
-            (gains or {}).get(name, {}),
+            gains.get(name, {}),
             episode_seed(seed, episode),
             _times(start, end, speed / fps),
             width,
