@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 
 from artde_gym.errors import ActionError, ArtdeGymError, OptionError
 
+NAME_BYTES = 200
+"""Of a name that is a part of a file's: file systems take 255, and a number, an ending and what is added come to it."""
+
 
 def number(field: str, value: Any, low: float, high: float, allowed: str) -> float:
     """The value as a float, if it is a number from `low` to `high`.
@@ -73,6 +76,8 @@ def file_name(field: str, value: object) -> str:
     """
     if not (isinstance(value, str) and 0 < len(value) <= 100 and value[0] != "." and value.isprintable()):
         raise OptionError(field, value, "up to 100 printable characters, the first no dot")
+    if len(value.encode()) > NAME_BYTES:
+        raise OptionError(field, value, f"up to {NAME_BYTES} bytes of UTF-8: files are named by it")
     if "/" in value or "\\" in value:
         raise OptionError(field, value, "a name without slashes: files are named by it")
     return value

@@ -40,6 +40,11 @@ class GainRange(NamedTuple):
 
 
 _controllers: dict[str, ControllerSpec] = {}
+_own: set[str] = set()
+"""Names of the controllers that this project brings."""
+
+REPLACEABLE = "preset"
+"""The one fixed argument that an override may replace: it says from which gains to start, not which law it is."""
 
 
 def register_controller(
@@ -54,15 +59,25 @@ def register_controller(
         text: one line for listings.
         search: "module:function" for `artde-gym tune`; called as function(env, **kwargs), it returns a mapping from
             gains to `GainRange`.
-        kwargs: fixed arguments of the function.
+        kwargs: fixed arguments of the function, which no override replaces (but for a `preset`).
 
     Raises:
+        OptionError: for a name that is no word, or that of a controller of this project.
         UnknownNameError: if an entry point is not of that form.
     """
+    if not (isinstance(name, str) and name):
+        raise OptionError("name of a controller", name, "a word")
     for field, point in (("entry_point", entry_point), ("search", search)):
-        if point is not None and point.count(":") != 1:
+        if point is not None and not _is_entry_point(point):
             raise UnknownNameError(field, point, '"module:function"')
-    register_spec(ControllerSpec(name, entry_point, dict(kwargs), text, search))
+    spec = ControllerSpec(name, entry_point, dict(kwargs), text, search)
+    if name in _own and _controllers[name] != spec:
+        raise OptionError("name of a controller", name, f"a new name; these are taken: {', '.join(sorted(_own))}")
+    register_spec(spec)
+
+
+def _is_entry_point(point: object) -> bool:
+    return isinstance(point, str) and len(parts := point.split(":")) == 2 and all(parts)
 
 
 def register_spec(spec: ControllerSpec) -> None:
@@ -76,38 +91,60 @@ def registered_controllers() -> dict[str, ControllerSpec]:
 
 
 def make_controller(name: str, env: Any, /, **overrides: Any) -> Any:
-    """Build the controller called `name` for an environment; `overrides` replace its arguments and gains.
+    """Build the controller called `name` for an environment; `overrides` replace its gains, preset and options.
 
     Raises:
-        UnknownNameError: if no controller has this name.
-        OptionError: for arguments that it does not take.
+        UnknownNameError: if no controller has this name, or its entry point names nothing that can be imported.
+        OptionError: for arguments that it does not take or that its name has fixed, or if it makes no policy.
     """
     known = _known(name)
-    make, arguments = resolved(known.entry_point), {**known.kwargs, **overrides}
+    for fixed in known.kwargs.keys() & overrides.keys() - {REPLACEABLE}:
+        allowed = f"its gains, `preset` and options; {name!r} stands for {fixed} = {known.kwargs[fixed]!r}"
+        raise OptionError(f"gains of {name!r}", {fixed: overrides[fixed]}, allowed)
+    make, arguments = _imported(name, known.entry_point), {**known.kwargs, **overrides}
     try:
         inspect.signature(make).bind(env, **arguments)
     except TypeError as error:
         raise OptionError(f"gains of {name!r}", overrides, f"arguments of {known.entry_point} ({error})") from error
-    return make(env, **arguments)
+    policy = make(env, **arguments)
+    if not hasattr(policy, "predict"):
+        raise OptionError(f"result of {known.entry_point}", policy, f"an object with `predict`, to be {name!r}")
+    return policy
 
 
 def search_space(name: str, env: Any) -> dict[str, GainRange]:
     """The gains of the controller called `name` that tuning may change, for the robot of an environment.
 
     Raises:
-        UnknownNameError: if no controller has this name, or if nobody said where to look for its gains.
+        UnknownNameError: if no controller has this name, its gains have no ranges, or `search` cannot be imported.
     """
     known = _known(name)
     if known.search is None:
         tunable = [other for other, spec in _controllers.items() if spec.search is not None]
         raise UnknownNameError("controller to be tuned", name, among(name, tunable))
-    return dict(resolved(known.search)(env, **known.kwargs))
+    return dict(_imported(name, known.search)(env, **known.kwargs))
 
 
 def _known(name: str) -> ControllerSpec:
     if name not in _controllers:
         raise UnknownNameError("controller", name, among(name, _controllers))
     return _controllers[name]
+
+
+def _imported(name: str, entry_point: str) -> Callable[..., Any]:
+    """The function behind a controller.
+
+    Raises:
+        UnknownNameError: if it cannot be imported.
+    """
+    try:
+        found = resolved(entry_point)
+    except (ImportError, AttributeError) as error:
+        allowed = f'"module:function" of what can be imported ({error})'
+        raise UnknownNameError(f"entry point of {name!r}", entry_point, allowed) from error
+    if not callable(found):
+        raise UnknownNameError(f"entry point of {name!r}", entry_point, '"module:function" of a function or class')
+    return found
 
 
 def resolved(entry_point: str) -> Callable[..., Any]:
@@ -163,3 +200,4 @@ def register_laws() -> None:
             "QuadInfinity-Payload-v0": "quadrotor-gale",
         },
     )
+    _own.update(_controllers)

@@ -6,12 +6,14 @@ acceleration du that the base adds to the one it desires, at every control perio
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from artde_gym.evaluation.identity import digest
 from artde_gym.registration import make_controller
 from baselines.coupling import Coupling
 from baselines.ojas import OjasCoupling
@@ -109,6 +111,14 @@ class ResidualPolicy(Policy):
     def __init__(self, name: str, plant: Plant, residual: Residual, actor: Callable[[Array], Array]) -> None:
         super().__init__(name, plant, residual.base.gains)
         self.residual, self.actor = residual, actor
+
+    @functools.cached_property
+    def identity(self) -> str | None:
+        """Hash of the recipe and of what was learned; None if the actor does not tell what that is."""
+        try:
+            return digest([self.name, self.residual.recipe, self.actor])
+        except TypeError:
+            return None
 
     def read(self, observation: Array) -> _Signals:
         return _Signals(observation, None)

@@ -18,6 +18,7 @@ from stable_baselines3.common.logger import configure
 from stable_baselines3.common.utils import set_random_seed
 from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv, VecMonitor, VecNormalize
 
+from artde_gym.evaluation.lock import writes_folder
 from artde_gym.layout import Layout
 from baselines.checkpoint import Checkpoints
 from baselines.export import exported
@@ -35,6 +36,7 @@ ENDED = 8  # episodes that such a share needs
 SAC_INTERVAL = 4096  # decisions between two checkpoints
 
 
+@writes_folder
 def train(training: Training, out: str | Path, on_progress: Callable[[Progress], None] | None = None) -> Path:
     """Train, or continue, and return the folder of the best policy so far.
 

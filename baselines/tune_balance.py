@@ -16,6 +16,7 @@ from cmaes import CMA
 from numpy.typing import NDArray
 
 from artde_gym.arguments import reading
+from artde_gym.evaluation.lock import writes_folder
 from baselines.balance import GAINS, balance_network
 from baselines.errors import TrainingError
 from baselines.network import Network
@@ -30,6 +31,7 @@ DURATION = 5.5  # s, of an episode
 _PUSH = {"push": [push({"choice": [15.0, 20.0, 25.0, 30.0]}, start={"uniform": [2.2, 3.2]})]}
 
 
+@writes_folder
 def tune(training: Training, out: str | Path, on_progress: Callable[[Progress], None] | None = None) -> Path:
     """Tune, or continue, and return the folder of the best gains so far; `steps` counts decisions.
 

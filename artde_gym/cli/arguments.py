@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import contextlib
 import datetime
 import json
 import os
@@ -26,6 +28,10 @@ Engine = Annotated[str | None, typer.Option(help=f"Physics engine: {' or '.join(
 Disturbances = Annotated[str | None, typer.Option(help="JSON, in place of those that belong to what is run.")]
 EnvKwargs = Annotated[str | None, typer.Option(help="JSON, arguments of the environment.")]
 Gains = Annotated[str | None, typer.Option(help='JSON, e.g. {"artde": {"gamma_0": 200}}.')]
+AllowMixed = Annotated[
+    bool,
+    typer.Option("--allow-mixed", help="Continue a folder that other software has begun; its provenance will say so."),
+]
 Report = Annotated[bool, typer.Option("--report", help="Write report.html, too.")]
 Pictures = Annotated[
     bool, typer.Option("--pictures", help="Report with pictures of the motion, pushes and falls; runs them once more.")
@@ -72,5 +78,27 @@ def processes(workers: int | None) -> int:
 
 
 def folder_of(out: Path | None) -> Path:
-    """The results folder that was asked for, or one of this second."""
-    return out or Path("runs") / datetime.datetime.now().strftime("%Y-%m-%d-%H%M%S")
+    """The results folder that was asked for, or a new one of this second, which is this process's own."""
+    if out is not None:
+        return out
+    second = Path("runs") / datetime.datetime.now().strftime("%Y-%m-%d-%H%M%S")
+    folder, number = second, 1
+    while not _made(folder):
+        number += 1
+        folder = second.with_name(f"{second.name}-{number}")
+    atexit.register(_remove_if_empty, folder.absolute())
+    return folder
+
+
+def _made(folder: Path) -> bool:
+    """Make a folder, if it is not there yet."""
+    try:
+        folder.mkdir(parents=True)
+    except FileExistsError:
+        return False
+    return True
+
+
+def _remove_if_empty(folder: Path) -> None:
+    with contextlib.suppress(OSError):
+        folder.rmdir()

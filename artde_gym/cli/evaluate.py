@@ -9,6 +9,7 @@ from rich.console import Console
 
 from artde_gym.cli.arguments import (
     WALK,
+    AllowMixed,
     Backend,
     Controllers,
     Disturbances,
@@ -57,6 +58,7 @@ def evaluate(
         int | None, typer.Option(help="Episodes that leave signals. Default: all of them; none in the batch backend.")
     ] = None,
     trace_hz: Annotated[float, typer.Option(help="Rate of stored signals; inf for all of them.")] = 100.0,
+    allow_mixed: AllowMixed = False,
     report: Report = False,
     pictures: Pictures = False,
     videos: Videos = False,
@@ -85,6 +87,7 @@ def evaluate(
             backend=backend,  # pyright: ignore[reportArgumentType]  # checked there
             traced=traced,
             trace_hz=trace_hz,
+            allow_mixed=allow_mixed,
             on_progress=display,
         )
     print_result(result, console)

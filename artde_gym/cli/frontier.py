@@ -8,6 +8,7 @@ import typer
 from rich.console import Console
 
 from artde_gym.cli.arguments import (
+    AllowMixed,
     Backend,
     Controllers,
     Disturbances,
@@ -52,6 +53,7 @@ def frontier(
     env_kwargs: EnvKwargs = None,
     gains: Gains = None,
     backend: Backend = "single",
+    allow_mixed: AllowMixed = False,
     report: Report = False,
 ) -> None:
     """Find how much of one disturbance each controller survives; the same command continues an interrupted run."""
@@ -75,6 +77,7 @@ def frontier(
             env_kwargs=kwargs,
             gains=json_object("--gains", gains),
             backend=backend,  # pyright: ignore[reportArgumentType]  # checked there
+            allow_mixed=allow_mixed,
             on_progress=lambda value, update: display(update, f"{vary} {value:g}"),
         )
     print_frontier(found, console)

@@ -9,7 +9,7 @@ import pandas as pd
 import typer
 from rich.console import Console
 
-from artde_gym.cli.arguments import ENGINES, Pictures, Report, Seed, Videos, Workers, names, processes
+from artde_gym.cli.arguments import ENGINES, AllowMixed, Pictures, Report, Seed, Videos, Workers, names, processes
 from artde_gym.cli.display import Display
 from artde_gym.cli.report import show_report
 from artde_gym.evaluation.console import print_claims, print_result
@@ -32,6 +32,7 @@ def reproduce(
     out: Annotated[
         Path, typer.Option(help="Results folder, one inside for each engine and robot; the same call continues it.")
     ] = Path("runs/reproduce"),
+    allow_mixed: AllowMixed = False,
     report: Report = False,
     pictures: Pictures = False,
     videos: Videos = False,
@@ -58,6 +59,7 @@ def reproduce(
                     seed=seed,
                     workers=processes(workers),
                     engine=one,
+                    allow_mixed=allow_mixed,
                     on_progress=lambda what, update, display=display: display(update, what),
                 )
             if len(engines) > 1:

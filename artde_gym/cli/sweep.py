@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from artde_gym.cli.arguments import Workers, processes
+from artde_gym.cli.arguments import AllowMixed, Workers, processes
 from artde_gym.cli.display import Display
 from artde_gym.studies import sweep as run_sweep
 from artde_gym.studies.sweep.console import print_sweep
@@ -24,6 +24,7 @@ def sweep(
     address: Annotated[
         str | None, typer.Option(help="Of a running Ray cluster, auto for this machine's. Default: one of its own.")
     ] = None,
+    allow_mixed: AllowMixed = False,
 ) -> None:
     """Run a grid or a random sample of cells; the same command continues after whatever happened."""
     console = Console()
@@ -34,6 +35,7 @@ def sweep(
             workers=processes(workers),
             executor=executor,  # pyright: ignore[reportArgumentType]  # checked there
             address=address,
+            allow_mixed=allow_mixed,
             on_progress=lambda what, update: display(update, what),
         )
     print_sweep(found, console)

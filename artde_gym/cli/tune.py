@@ -9,6 +9,7 @@ from rich.console import Console
 
 from artde_gym.cli.arguments import (
     WALK,
+    AllowMixed,
     Backend,
     Controllers,
     Disturbances,
@@ -44,6 +45,7 @@ def tune(
     engine: Engine = None,
     disturbances: Disturbances = None,
     env_kwargs: EnvKwargs = None,
+    allow_mixed: AllowMixed = False,
 ) -> None:
     """Tune gains with the same budget for every controller; the same command continues an interrupted run."""
     kwargs = environment_kwargs(env_kwargs, engine)
@@ -62,6 +64,7 @@ def tune(
             disturbances=optional_json("--disturbances", disturbances),
             env_kwargs=kwargs,
             backend=backend,  # pyright: ignore[reportArgumentType]  # checked there
+            allow_mixed=allow_mixed,
             on_progress=lambda what, update: display(update, what),
         )
     print_tuning(found, console)

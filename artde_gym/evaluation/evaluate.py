@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 import itertools
 import json
 import pickle
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
@@ -18,7 +17,10 @@ from artde_gym.errors import OptionError, UnknownNameError, among
 from artde_gym.evaluation import canonical
 from artde_gym.evaluation.batch import run_batch
 from artde_gym.evaluation.environments import Backend, single, tracking_of, vector
+from artde_gym.evaluation.identity import behind, identity_of
+from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.metrics import Span
+from artde_gym.evaluation.provenance import provenance
 from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.rollout import Episode, Policy, run_episode
 from artde_gym.evaluation.seeds import episode_seed, with_exact_seeds
@@ -69,6 +71,7 @@ class Update(NamedTuple):
     total: int
 
 
+@writes_folder
 def evaluate(
     controllers: Sequence[str | Policy] | Mapping[str, str | Policy],
     env_id: str | None = None,
@@ -84,6 +87,7 @@ def evaluate(
     backend: Backend = "single",
     traced: int | None = None,
     trace_hz: float = 100.0,
+    allow_mixed: bool = False,
     on_progress: Callable[[Update], None] | None = None,
 ) -> Result:
     """Run every controller through the same seeded episodes.
@@ -105,6 +109,8 @@ def evaluate(
         traced: how many episodes of each controller and scenario leave signals in the folder; None for all of them, or
             none in the batch backend.
         trace_hz: rate of stored signals; infinite for all of them.
+        allow_mixed: continue a folder whose episodes other software ran (versions, source code, weights of controllers,
+            code of the user's own); its provenance then says so.
         on_progress: called about once a simulated second of each running episode or chunk, and at its end.
 
     Returns:
@@ -112,7 +118,7 @@ def evaluate(
 
     Raises:
         UnknownNameError, OptionError, DisturbanceError, GainError: for a bad argument, before the first episode.
-        StoreError: if `out` holds other results.
+        StoreError: if `out` holds other results, or results of other software, or is written by another process.
     """
     if not (isinstance(episodes, int) and episodes >= 1):
         raise OptionError("episodes", episodes, "a whole number >= 1")
@@ -129,18 +135,18 @@ def evaluate(
     if traced is None:
         traced = episodes if backend == "single" else 0
     named = named_controllers(controllers)
-    gains = {name: dict(values) for name, values in (gains or {}).items()}
-    for name in gains:
-        if name not in named:
-            raise UnknownNameError("gains", name, among(name, named))
+    gains = checked_gains(gains, named)
     cells = cells_of(env_id, scenario, dict(env_kwargs or {}), disturbances)
-    _try_out(backend, cells, named, gains)
+    evidence = _try_out(backend, cells, named, gains)
+    if workers > 1:
+        check_picklable(named, gains)
 
     store = None
     if out is not None:
+        identities = {name: identity_of(item) for name, item in named.items()}
         configuration = {
             "cells": [{"name": cell.name, "env_id": cell.env_id, "kwargs": cell.kwargs} for cell in cells],
-            "controllers": {name: identity_of(policy) for name, policy in named.items()},
+            "controllers": {name: identity.value for name, identity in identities.items()},
             "gains": gains,
             "episodes": episodes,
             "seed": seed,
@@ -148,7 +154,8 @@ def evaluate(
             "traced": traced,
             "trace_hz": trace_hz if np.isfinite(trace_hz) else "all",
         }
-        store = Store(Path(out), configuration)
+        made_by = provenance(evidence, {name: identity.by for name, identity in identities.items()})
+        store = Store(Path(out), configuration, made_by, allow_mixed=allow_mixed)
     rows = [] if store is None else store.rows
     done = {(row["scenario"], row["controller"], row["episode"]) for row in rows}
     tasks = [
@@ -291,14 +298,49 @@ def cells_of(
     return cells
 
 
+def checked_gains(given: Any, named: Collection[str]) -> dict[str, dict[str, Any]]:
+    """Gains of named controllers.
+
+    Raises:
+        OptionError, UnknownNameError: for anything but mappings, or a controller that is not among the named.
+    """
+    if not (
+        given is None or (isinstance(given, Mapping) and all(isinstance(gains, Mapping) for gains in given.values()))
+    ):
+        raise OptionError("gains", given, "a mapping of controllers to mappings of their gains")
+    for name in given or {}:
+        if name not in named:
+            raise UnknownNameError("gains", name, among(name, named))
+    return {name: dict(gains) for name, gains in (given or {}).items()}
+
+
 def _try_out(
     backend: Backend, cells: list[Cell], named: Mapping[str, Any], gains: Mapping[str, dict[str, Any]]
-) -> None:
-    """Build everything once, so that a bad argument shows before the first episode and not in a worker."""
+) -> dict[str, str]:
+    """Build everything once, so that a bad argument shows before the first episode and not in a worker.
+
+    Returns what is `behind` the controllers.
+    """
+    found: dict[str, str] = {}
     for cell in cells:
         env = tried(backend, cell)
         for name, item in named.items():
-            policy_for(item, env, gains.get(name, {}))
+            found |= behind(name, cell.env_id, item, policy_for(item, env, gains.get(name, {})))
+    return found
+
+
+def check_picklable(named: Mapping[str, Any], gains: Mapping[str, dict[str, Any]]) -> None:
+    """See that controllers can be sent to other processes.
+
+    Raises:
+        OptionError: if one cannot.
+    """
+    for name, item in named.items():
+        try:
+            pickle.dumps((item, gains.get(name)))
+        except Exception as error:  # pickling runs code of the policy's class
+            allowed = f"one that can be pickled, to be sent to several workers; or workers=1 ({error})"
+            raise OptionError(f"controller {name!r}", item, allowed) from error
 
 
 def tried(backend: Backend, cell: Cell) -> Any:
@@ -317,13 +359,6 @@ def tried(backend: Backend, cell: Cell) -> Any:
     env, options = _single(cell)
     env.reset(options=options)
     return env
-
-
-def identity_of(item: Policy | ControllerSpec) -> str:
-    """What tells controllers apart in a store: the entry point, or the content of a policy object."""
-    if isinstance(item, ControllerSpec):
-        return f"{item.entry_point} {json.dumps(dict(item.kwargs), sort_keys=True)}"
-    return f"{type(item).__name__} {hashlib.sha256(pickle.dumps(item)).hexdigest()}"
 
 
 def labels_of(task: Task, number: int) -> dict[str, Any]:

@@ -5,7 +5,7 @@
     summary.json     configuration and provenance, written before the first episode
     traces/          <scenario>/<controller>-<episode>.npz, signals at the trace's rate
 
-A folder belongs to one configuration: the same one continues it, any other is refused.
+A folder belongs to one configuration and one software: the same ones continue it, any others are refused.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import io
 import json
 import os
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -25,32 +25,44 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from artde_gym.arguments import file_name, reading
-from artde_gym.errors import StoreError
-from artde_gym.evaluation.provenance import provenance
+from artde_gym.errors import OptionError, StoreError
+from artde_gym.evaluation.lock import is_empty
+from artde_gym.evaluation.provenance import MIXED, continued
 from artde_gym.evaluation.seeds import episode_seed, with_exact_seeds
 
-TABLE = "episodes.csv"
+RECORD, TABLE = "summary.json", "episodes.csv"
 KEY = ("scenario", "controller", "episode")
 _WORDS = ("scenario", "controller", "env", "fall_reason")
 _UNDAMAGED = "a table of episodes as `evaluate` wrote it; without the damaged rows, these episodes are run again"
 
 
 class Store:
-    """The folder of one evaluation.
+    """The folder of one evaluation, held by a lock (`artde_gym.evaluation.lock`) for as long as it is written.
+
+    Args:
+        folder: of the results.
+        configuration: what is run.
+        made_by: provenance of this process.
+        allow_mixed: whether results of other software may be continued.
 
     Raises:
-        StoreError: if the folder holds anything else than results of the same configuration.
+        OptionError: if JSON cannot write the configuration, or a name is none for files.
+        StoreError: if the folder holds anything else than results of the same configuration and software.
     """
 
-    def __init__(self, folder: Path, configuration: Mapping[str, Any]) -> None:
+    def __init__(
+        self, folder: Path, configuration: Mapping[str, Any], made_by: dict[str, Any], *, allow_mixed: bool = False
+    ) -> None:
         self.folder = folder
-        self._configuration = json.loads(json.dumps(configuration))
+        self._configuration = plain_configuration(configuration)
         for name in configuration["controllers"]:
             file_name("name of a controller", name)  # of its traces
-        if claim(self.folder, "summary.json", self._configuration):
-            self._write_record(None)
-        self.rows = self._read_rows()
+        before = claim(self.folder, RECORD, self._configuration)
+        self.rows = [] if before is None else self._read_rows()
         self._columns = list(self.rows[0]) if self.rows else []
+        self._provenance = continued(folder, before if self.rows else None, made_by, allow_mixed=allow_mixed)
+        if not self.rows or MIXED in self._provenance:  # what is mixed is known before it is
+            self._write_record(None)
 
     def add(self, episodes: Sequence[tuple[Mapping[str, Any], Mapping[str, NDArray[Any]]]]) -> None:
         """Keep finished episodes, each a row and traces; rows are written last, so that a row always has its traces."""
@@ -82,12 +94,12 @@ class Store:
     def _write_record(self, summary: pd.DataFrame | None) -> None:
         record = {
             "configuration": self._configuration,
-            "provenance": provenance(),
-            "episodes": 0 if summary is None else len(self.rows),
+            "provenance": self._provenance,
+            "episodes": len(self.rows),
             "summary": [] if summary is None else json.loads(str(summary.reset_index().to_json(orient="records"))),
         }
         text = json.dumps(record, indent=2) + "\n"
-        write_atomically(self.folder / "summary.json", lambda file: file.write(text.encode()))
+        write_atomically(self.folder / RECORD, lambda file: file.write(text.encode()))
 
     def _read_rows(self) -> list[dict[str, Any]]:
         path = self.folder / TABLE
@@ -104,8 +116,6 @@ class Store:
         for row in rows:
             if row["seed"] != episode_seed(wanted["seed"], row["episode"]):
                 raise StoreError(TABLE, str(path), f"{_UNDAMAGED} (episode {row['episode']} has another seed)")
-        for row in rows:
-            row["fall_reason"] = row["fall_reason"] if isinstance(row.get("fall_reason"), str) else ""
         if path.stat().st_size != len(whole.encode()):
             write_atomically(path, lambda file: file.write(whole.encode()))
         return rows
@@ -130,10 +140,7 @@ def read_episodes(folder: Path) -> tuple[str, pd.DataFrame]:
         whole = text[: text.rfind("\n") + 1]
         if not whole:
             return "", pd.DataFrame({name: [] for name in KEY})
-        lines = list(csv.reader(io.StringIO(whole), strict=True))
-        frame = pd.read_csv(io.StringIO(whole), keep_default_na=True)
-        if len(set(lines[0])) != len(lines[0]) or any(len(line) != len(lines[0]) for line in lines):
-            raise ValueError("rows of different lengths, or a column twice")
+        frame = parse_table(whole, _WORDS)
         for name in KEY[:2]:
             for value in frame[name].unique():
                 file_name(name, value)
@@ -150,8 +157,61 @@ def read_episodes(folder: Path) -> tuple[str, pd.DataFrame]:
     return whole, with_exact_seeds(frame)
 
 
-def claim(folder: Path, record: str, configuration: Mapping[str, Any]) -> bool:
-    """Make `folder` and return True, or return False if its `record` (a file name) holds this configuration already.
+def parse_table(text: str, words: Collection[str]) -> pd.DataFrame:
+    """A CSV table; the columns named by `words` hold what is written there, all others numbers to the last bit.
+
+    Left to itself, pandas takes "1", "true" and "nan" for something else than words, and some releases round numbers.
+
+    Raises:
+        ValueError: if it is no table, or has a column twice.
+    """
+    try:
+        columns, *rows = csv.reader(io.StringIO(text), strict=True)
+    except csv.Error as error:
+        raise ValueError(str(error)) from error
+    if len(set(columns)) != len(columns) or any(len(row) != len(columns) for row in rows):
+        raise ValueError("rows of different lengths, or a column twice")
+    parsed = {
+        name: [row[i] for row in rows] if name in words else _parsed([row[i] for row in rows])
+        for i, name in enumerate(columns)
+    }
+    return pd.DataFrame(parsed)
+
+
+def _parsed(column: list[str]) -> list[Any]:
+    """A column of truth values, whole numbers or numbers, where nothing is NaN; of words if it is none of these."""
+    if not {*column} - {"True", "False"}:
+        return [value == "True" for value in column]
+    for kind in (int, float):
+        with contextlib.suppress(ValueError):
+            return [kind(value if kind is int else value or "nan") for value in column]
+    return [{"True": True, "False": False, "": np.nan}.get(value, value) for value in column]
+
+
+def plain_configuration(configuration: Mapping[str, Any]) -> dict[str, Any]:
+    """A configuration as JSON gives it back, NumPy's values as numbers and lists of them.
+
+    Raises:
+        OptionError: if it holds a value that JSON cannot write.
+    """
+    plain: dict[str, Any] = {}
+    for field, value in configuration.items():
+        try:
+            plain[field] = json.loads(json.dumps(value, default=_from_numpy))
+        except (TypeError, ValueError) as error:
+            allowed = f"values that JSON can write, to be stored in a folder ({error})"
+            raise OptionError(field, value, allowed) from error
+    return plain
+
+
+def _from_numpy(value: Any) -> Any:
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} is no type of JSON")
+
+
+def claim(folder: Path, record: str, configuration: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    """Make `folder` and return None, or the provenance in its `record` (a file name) if it is of this configuration.
 
     Raises:
         StoreError: if the folder holds anything else than results of the same configuration.
@@ -159,16 +219,17 @@ def claim(folder: Path, record: str, configuration: Mapping[str, Any]) -> bool:
     path = folder / record
     if path.exists():
         with reading("output folder", folder, f"a folder whose {record} can be read", StoreError):
-            found = dict(json.loads(path.read_text(encoding="utf-8"))["configuration"])
+            content = json.loads(path.read_text(encoding="utf-8"))
+            found, before = dict(content["configuration"]), dict(content.get("provenance", {}))
         if found != configuration:
             differs = [key for key in {*found, *configuration} if found.get(key) != configuration.get(key)]
             allowed = f"a new folder; this one holds other results (different: {', '.join(sorted(differs))})"
             raise StoreError("output folder", str(folder), allowed)
-        return False
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        return before
+    if folder.exists() and not (folder.is_dir() and is_empty(folder)):
         raise StoreError("output folder", str(folder), "a new or empty folder; this one holds something else")
     folder.mkdir(parents=True, exist_ok=True)
-    return True
+    return None
 
 
 def write_atomically(path: Path, write: Callable[[BinaryIO], Any], by_way_of: Path | None = None) -> None:

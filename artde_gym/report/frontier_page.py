@@ -10,6 +10,7 @@ from typing import Any
 import pandas as pd
 
 from artde_gym.errors import StoreError
+from artde_gym.evaluation.store import parse_table
 from artde_gym.palette import looks
 from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.html import Cell, figure, table
@@ -28,11 +29,11 @@ def read_frontier(folder: Path) -> tuple[Frontier, dict[str, Any]]:
     try:
         record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
         wanted = record["configuration"]
-        table, levels = (pd.read_csv(folder / name, keep_default_na=True) for name in ("frontier.csv", "levels.csv"))
+        texts = [(folder / name).read_text(encoding="utf-8") for name in ("frontier.csv", "levels.csv")]
+        table, levels = (parse_table(text, ("controller", "relation")) for text in texts)
         varied, survival = Varied(**wanted["axis"]), wanted["survival"]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise StoreError("frontier", str(folder), "a folder in which at least one level was finished") from error
-    table["relation"] = table["relation"].fillna("")
     return Frontier(table, levels, varied, survival, folder, bool(record.get("complete"))), record
 
 

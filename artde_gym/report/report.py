@@ -12,6 +12,7 @@ from typing import Any
 from artde_gym.arguments import reading
 from artde_gym.errors import StoreError
 from artde_gym.evaluation.environments import robot_of
+from artde_gym.evaluation.provenance import MIXED
 from artde_gym.evaluation.store import write_atomically
 from artde_gym.report import frontier_page, signals, tables, training_page
 from artde_gym.report.answer import headline, sentences
@@ -173,9 +174,15 @@ def _origin(record: Mapping[str, Any]) -> str:
         "time": origin["time"],
         "commit": origin["commit"] or "of an installed package",
         "Python": f"{origin['python']} on {origin['platform']}",
-        "packages": ", ".join(f"{name} {version}" for name, version in origin["packages"].items()),
+        "packages": _packages(origin),
     }
+    for i, other in enumerate(origin.get(MIXED, []), start=1):
+        facts[f"mixed with results of other software ({i})"] = f"commit {other['commit']}: {_packages(other)}"
     return _facts(facts, record["configuration"])
+
+
+def _packages(origin: Mapping[str, Any]) -> str:
+    return ", ".join(f"{name} {version}" for name, version in origin["packages"].items())
 
 
 def _facts(facts: Mapping[str, str], configuration: Mapping[str, Any]) -> str:

@@ -18,7 +18,8 @@ from artde_gym.errors import StoreError
 from artde_gym.evaluation.environments import tracking_of
 from artde_gym.evaluation.metrics import Span, events_of
 from artde_gym.evaluation.result import Result
-from artde_gym.evaluation.store import read_episodes
+from artde_gym.evaluation.store import parse_table, read_episodes
+from artde_gym.studies.reproduce.claims import CLAIM_COLUMNS
 from artde_gym.tracking import Tracking
 
 ABLATIONS = "ablation"  # folder of `reproduce`'s ablations
@@ -56,8 +57,10 @@ class Run:
             count = len(wanted["cells"]) * len(wanted["controllers"]) * wanted["episodes"]
         _, episodes = read_episodes(folder)
         complete = len(episodes) >= count
-        claims = folder / "claims.csv"
-        judged = pd.read_csv(claims, keep_default_na=False) if claims.exists() else None
+        judged, claims = None, folder / "claims.csv"
+        if claims.exists():
+            with reading("claims.csv", claims, "a table that `reproduce` wrote", StoreError):
+                judged = parse_table(claims.read_text(encoding="utf-8"), CLAIM_COLUMNS)
         found = {file.parent.name: cls.read(file.parent) for file in folder.glob(f"{ABLATIONS}/*/summary.json")}
         ablation = {cell["name"]: found[cell["name"]] for cell in wanted["cells"] if cell["name"] in found}
         if ablation:

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from artde_gym.errors import StoreError
+from artde_gym.evaluation.store import parse_table
 from artde_gym.palette import looks
 from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.html import Cell, figure, paragraph, table
@@ -51,7 +52,7 @@ def read_training(folder: Path) -> Trained:
     try:
         record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
         wanted = record["configuration"]
-        tests = pd.read_csv(folder / CURVE)
+        tests = parse_table((folder / CURVE).read_text(encoding="utf-8"), ())
         name = f"{wanted['recipe']['base']}+{wanted['algo']}"
         tests = tests.astype(float)
     except (OSError, ValueError, KeyError, TypeError) as error:

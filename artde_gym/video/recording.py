@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artde_gym.errors import OptionError
-from artde_gym.evaluation.evaluate import cells_of, named_controllers
+from artde_gym.evaluation.evaluate import cells_of, checked_gains, named_controllers
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.scenarios import SCENARIOS
@@ -76,6 +76,7 @@ def video(
         raise OptionError("columns", columns, "a whole number >= 1")
     writer.check(out)
     named = named_controllers(controllers)
+    gains = checked_gains(gains, named)
     (cell,) = cells_of(env_id, scenario, dict(env_kwargs or {}), disturbances)
     fps = writer.frame_rate(out, fps)
     films = {
@@ -83,7 +84,7 @@ def video(
             cell.env_id,
             cell.kwargs,
             policy,
-            (gains or {}).get(name, {}),
+            gains.get(name, {}),
             episode_seed(seed, episode),
             _times(start, end, speed / fps),
             width,

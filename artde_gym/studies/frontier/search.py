@@ -23,7 +23,6 @@ falls and rises again between them stays unseen.
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -34,13 +33,14 @@ import gymnasium as gym
 import numpy as np
 import pandas as pd
 
-from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.errors import OptionError, among
 from artde_gym.evaluation import statistics
 from artde_gym.evaluation.environments import Backend, arguments_of
-from artde_gym.evaluation.evaluate import CUSTOM, Update, evaluate, labelled
-from artde_gym.evaluation.provenance import provenance
+from artde_gym.evaluation.evaluate import CUSTOM, Update, checked_gains, evaluate, labelled
+from artde_gym.evaluation.lock import writes_folder
+from artde_gym.evaluation.provenance import MIXED, continued, provenance
 from artde_gym.evaluation.rollout import Policy
-from artde_gym.evaluation.store import claim, write_atomically
+from artde_gym.evaluation.store import claim, plain_configuration, write_atomically
 from artde_gym.kit import Harder
 from artde_gym.studies.frontier.axis import Axis, axis
 from artde_gym.studies.frontier.result import RECORD, Frontier
@@ -55,6 +55,7 @@ Outcomes = Mapping[int, bool]
 """Grid index -> whether the level was survived."""
 
 
+@writes_folder
 def frontier(
     controllers: Sequence[str | Policy] | Mapping[str, str | Policy],
     env_id: str = "BipedPush-v0",
@@ -73,6 +74,7 @@ def frontier(
     env_kwargs: Mapping[str, Any] | None = None,
     gains: Mapping[str, Mapping[str, Any]] | None = None,
     backend: Backend = "single",
+    allow_mixed: bool = False,
     on_progress: Callable[[float, Update], None] | None = None,
 ) -> Frontier:
     """Find by bisection the hardest value of one disturbance that each controller survives.
@@ -93,7 +95,7 @@ def frontier(
         out: folder to store everything in; the same call continues an interrupted one.
         disturbances: in place of the standard test's; the environment's own duration is then kept, too.
         env_kwargs: arguments of the environment.
-        gains: as for `evaluate`, also `backend`.
+        gains: as for `evaluate`, also `backend` and `allow_mixed`.
         on_progress: called with the value of the running level and the progress of its episodes.
 
     Returns:
@@ -101,15 +103,12 @@ def frontier(
 
     Raises:
         UnknownNameError, OptionError, DisturbanceError, GainError: for a bad argument, before the first episode.
-        StoreError: if `out` holds other results.
+        StoreError: if `out` holds other results, or results of other software, or is written by another process.
     """
     if not (isinstance(survival, (int, float)) and 0 < survival <= 1):
         raise OptionError("survival", survival, "above 0 up to 1")
     named = labelled(controllers)
-    gains = {name: dict(values) for name, values in (gains or {}).items()}
-    for name in gains:
-        if name not in named:
-            raise UnknownNameError("gains", name, among(name, named))
+    gains = checked_gains(gains, named)
     varied = axis(env_id, vary, low, high, tolerance, harder)
     arguments = _arguments(env_id, backend, varied, env_kwargs or {})
     if disturbances is None:
@@ -134,7 +133,7 @@ def frontier(
         "gains": gains,
         "backend": backend,
     }
-    folder = None if out is None else _Folder(Path(out), configuration)
+    folder = None if out is None else _Folder(Path(out), configuration, allow_mixed)
     rows: list[dict[str, Any]] = []
 
     def run(index: int, names: list[str]) -> dict[str, bool]:
@@ -157,6 +156,7 @@ def frontier(
             gains={name: gains[name] for name in names if name in gains},
             backend=backend,
             trace_hz=TRACE_HZ,
+            allow_mixed=allow_mixed,
             on_progress=report,
         )
         if not result.complete:
@@ -280,14 +280,13 @@ def _arguments(env_id: str, backend: Backend, varied: Axis, given: Mapping[str, 
 class _Folder:
     """The folder of one frontier, claimed by its record."""
 
-    def __init__(self, path: Path, configuration: Mapping[str, Any]) -> None:
+    def __init__(self, path: Path, configuration: Mapping[str, Any], allow_mixed: bool) -> None:
         self.path = path
-        try:
-            self._configuration = json.loads(json.dumps(configuration))
-        except TypeError as error:
-            raise OptionError("disturbances, env_kwargs, gains", configuration, "values that JSON can write") from error
-        self._new = not path.exists()
-        if claim(path, RECORD, self._configuration):
+        self._configuration = plain_configuration(configuration)
+        before = claim(path, RECORD, self._configuration)
+        begun = before if (path / "levels").exists() else None
+        self._provenance = continued(path, begun, provenance(), allow_mixed=allow_mixed)
+        if before is None or MIXED in self._provenance:
             self._write_record(None)
 
     def level(self, value: float) -> Path:
@@ -303,14 +302,11 @@ class _Folder:
         """Give a folder back in which nothing was run, after an argument that `evaluate` refused."""
         if not (self.path / "levels").exists():
             (self.path / RECORD).unlink(missing_ok=True)
-            if self._new:
-                with contextlib.suppress(OSError):
-                    self.path.rmdir()
 
     def _write_record(self, found: Frontier | None) -> None:
         record = {
             "configuration": self._configuration,
-            "provenance": provenance(),
+            "provenance": self._provenance,
             "complete": found is not None and found.complete,
             "frontier": [] if found is None else json.loads(str(found.table.to_json(orient="records"))),
         }

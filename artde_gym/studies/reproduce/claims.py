@@ -20,6 +20,7 @@ from artde_gym.evaluation.pairing import paired_across
 from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.statistics import Estimate
 
+CLAIM_COLUMNS = ["scenario", "claim", "verdict", "measured", "thesis"]
 Outcome = Literal["holds", "does not hold", "undecided", "not measured"]
 
 
@@ -274,7 +275,7 @@ def judge(result: Result, claims: Sequence[Claim] = CLAIMS) -> pd.DataFrame:
     for claim in claims:
         verdict = claim.judge(result)
         rows.append((claim.scenario, claim.text, verdict.outcome, verdict.measured, claim.thesis))
-    return pd.DataFrame(rows, columns=["scenario", "claim", "verdict", "measured", "thesis"])
+    return pd.DataFrame(rows, columns=CLAIM_COLUMNS)
 
 
 def confirm(verdicts: Mapping[str, pd.DataFrame]) -> pd.DataFrame:

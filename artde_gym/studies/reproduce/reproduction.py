@@ -21,6 +21,7 @@ import pandas as pd
 
 from artde_gym.errors import OptionError, UnknownNameError, among
 from artde_gym.evaluation.evaluate import Update, evaluate
+from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.store import write_atomically
 from artde_gym.kit import ROBOTS, RobotKit
@@ -67,6 +68,7 @@ def scenarios_of(robot: str, names: Sequence[str] | None = None) -> tuple[str, .
     return own if names is None else tuple(name for name in names if find_scenario(name).env_id in environments)
 
 
+@writes_folder
 def reproduce(
     robot: str,
     out: str | Path,
@@ -78,6 +80,7 @@ def reproduce(
     seed: int = 0,
     workers: int = 1,
     engine: str = "bullet",
+    allow_mixed: bool = False,
     on_progress: Callable[[str, Update], None] | None = None,
 ) -> Reproduction:
     """Run a robot's scenarios with all its controllers and judge the claims made in them.
@@ -92,11 +95,12 @@ def reproduce(
         seed: of everything.
         workers: processes; the results do not depend on it.
         engine: physics engine.
+        allow_mixed: as for `evaluate`.
         on_progress: called with what runs ("episodes", "ablation in S1") and the progress of its episodes.
 
     Raises:
         UnknownNameError, OptionError: for a bad argument, before the first episode.
-        StoreError: if `out` holds other results.
+        StoreError: if `out` holds other results, or results of other software, or is written by another process.
     """
     chosen = scenarios_of(robot, scenarios)
     if not chosen:
@@ -123,6 +127,7 @@ def reproduce(
             env_kwargs={"engine": engine},
             gains=gains,
             traced=TRACED,
+            allow_mixed=allow_mixed,
             on_progress=report,
         )
 

@@ -40,7 +40,8 @@ from artde_gym.disturbances import KINDS
 from artde_gym.errors import OptionError, UnknownNameError, among
 from artde_gym.evaluation import canonical
 from artde_gym.evaluation.environments import Backend
-from artde_gym.evaluation.evaluate import Cell, cells_of, identity_of
+from artde_gym.evaluation.evaluate import Cell, cells_of
+from artde_gym.evaluation.identity import identity_of
 from artde_gym.registration import ControllerSpec, registered_controllers
 from artde_gym.scenarios import scenario as find_scenario
 from artde_gym.studies.frontier.axis import placed
@@ -298,7 +299,7 @@ def _point(settings: Mapping[str, Any], backend: Backend, names: set[Any]) -> Po
     (cell,) = cells_of(settings["env"], settings["scenario"], settings["env_kwargs"], settings["disturbances"])
     gains, seed, spec = settings["gains"].get(controller, {}), settings["seed"], known[controller]
     means = cell._replace(kwargs=canonical.arguments(cell.kwargs, cell.env_id, backend))
-    decides = [*means, controller, identity_of(spec), canonical.numbers(gains), seed, backend]
+    decides = [*means, controller, identity_of(spec).value, canonical.numbers(gains), seed, backend]
     digest = hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
     return Point(cell, controller, spec, gains, seed, digest[:16])
 

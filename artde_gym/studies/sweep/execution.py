@@ -19,6 +19,7 @@ from artde_gym.evaluation.evaluate import (
     CHUNK,
     Task,
     Update,
+    check_picklable,
     chunks_of,
     duration_of,
     labels_of,
@@ -26,6 +27,8 @@ from artde_gym.evaluation.evaluate import (
     run_task,
     tried,
 )
+from artde_gym.evaluation.identity import behind
+from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.rollout import Episode
 from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.evaluation.workers import Runs, run_here, run_parallel
@@ -60,6 +63,7 @@ class Sweep:
     set_aside: tuple[str, ...] = ()
 
 
+@writes_folder
 def sweep(
     given: str | Path | Mapping[str, Any],
     out: str | Path,
@@ -67,6 +71,7 @@ def sweep(
     workers: int = 1,
     executor: Executor = "local",
     address: str | None = None,
+    allow_mixed: bool = False,
     on_progress: OnProgress | None = None,
 ) -> Sweep:
     """Run all episodes of a sweep that its folder does not hold yet.
@@ -78,6 +83,7 @@ def sweep(
         workers: processes; the results do not depend on it.
         executor: "local", or "ray" for a Ray cluster, which its workers share.
         address: of a running Ray cluster, "auto" for this machine's; None starts one here with so many workers.
+        allow_mixed: as for `evaluate`.
         on_progress: called with what goes on ("cells checked", "episodes") and how far it is.
 
     Returns:
@@ -97,6 +103,8 @@ def sweep(
         raise OptionError("address", address, "none without executor 'ray'")
     parquet.pyarrow()
     plan = design(read(given) if isinstance(given, (str, Path)) else given)
+    if workers > 1 or executor == "ray":
+        check_picklable({point.controller: point.spec for point in plan.points}, {})
     types = parquet.types_of(point.columns for point in plan.points)
     points = {f"{point.cell.name} [{i}]": point for i, point in enumerate(plan.points)}
     report = on_progress or (lambda *_: None)
@@ -104,7 +112,7 @@ def sweep(
     with SweepStore(Path(out)) as store:
         _refuse_others(plan, store)
         _check(plan, points, store.done, report)
-        store.begin(plan.text, types)
+        store.begin(plan.text, types, _behind(plan), allow_mixed=allow_mixed)
         total = len(points) * plan.episodes
         finished = len(store.done)
 
@@ -173,6 +181,15 @@ def _check(plan: Design, points: Mapping[str, Point], done: set[Key], report: On
             last, env = _place(point), tried(plan.backend, point.cell)
         policy_for(point.spec, env, point.gains)
         report("cells checked", Update(_task(plan, name, point, [0]), 0.0, True, i, len(fresh)))
+
+
+def _behind(plan: Design) -> dict[str, str]:
+    """Weights and code behind the controllers, each of them built once for each environment."""
+    found: dict[str, str] = {}
+    for point in {(point.controller, point.cell.env_id): point for point in reversed(plan.points)}.values():
+        policy = policy_for(point.spec, tried(plan.backend, point.cell), point.gains)
+        found |= behind(point.controller, point.cell.env_id, point.spec, policy)
+    return found
 
 
 def _place(point: Point) -> tuple[str, str, str]:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from artde_gym.errors import OptionError, WorkerError
-from artde_gym.evaluation.provenance import DECISIVE, versions
+from artde_gym.evaluation.provenance import software
 from artde_gym.evaluation.workers import AHEAD, PATIENCE, Job, Runs, Work
 
 RETRIES = 3  # of a job whose worker or node is lost
@@ -34,12 +34,12 @@ def run_on_ray(work: Work, jobs: Iterable[Job], workers: int, address: str | Non
     if ours:
         _connect(ray, address, workers)
     do = ray.remote(_on_node).options(num_cpus=1, max_retries=RETRIES)
-    software, left, running = versions(DECISIVE), iter(jobs), dict[Any, Job]()
+    wanted, left, running = software(), iter(jobs), dict[Any, Job]()
     cores = _cores(ray)
     try:
         while True:
             for job in itertools.islice(left, max(AHEAD * cores - len(running), 0)):
-                running[do.remote(work, job, software)] = job
+                running[do.remote(work, job, wanted)] = job
             if not running:
                 return
             finished, _ = ray.wait(list(running), timeout=PATIENCE)
@@ -90,9 +90,9 @@ def _result(ray: Any, reference: Any) -> Any:
         raise WorkerError("Ray", reason, "workers that live; if memory is short, take fewer of them") from error
 
 
-def _on_node(work: Work, job: Job, software: dict[str, str]) -> Any:
+def _on_node(work: Work, job: Job, wanted: dict[str, str]) -> Any:
     """Do a job in a worker, whose results would differ in their last bits with other software."""
-    here = versions(DECISIVE)
-    if here != software:
-        raise OptionError("software of a Ray node", here, repr(software))
+    here = software()
+    if here != wanted:
+        raise OptionError("software of a Ray node", here, repr(wanted))
     return work(job, lambda *_: None)

@@ -3,7 +3,7 @@
     sweep.json                      format, and for each run what it was asked for and with what software
     episodes/part-000001.parquet    finished episodes, see `artde_gym.studies.sweep.parquet`; all have the same columns
     corrupt/                        files that were not as they had been written; their episodes are run again
-    sweep.lock                      held by the process that writes
+    .lock                           held by the process that writes, see `artde_gym.evaluation.lock`
 
 Every file is written under another name, synchronised with the disk and renamed: it is there whole or not at all. An
 episode is known by its cell (a hash of everything that decides about it) and its number, so that none is run twice;
@@ -14,7 +14,6 @@ hundredth of the run's time so far, at most for half a minute: no more work is l
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import json
 import os
 import re
@@ -26,7 +25,7 @@ from typing import Any
 import pandas as pd
 
 from artde_gym.errors import StoreError
-from artde_gym.evaluation.provenance import DECISIVE, provenance
+from artde_gym.evaluation.provenance import continued, provenance
 from artde_gym.evaluation.store import claim, write_atomically
 from artde_gym.studies.sweep import parquet
 
@@ -42,14 +41,16 @@ Key = tuple[str, int]
 
 
 class SweepStore:
-    """A sweep's folder, opened to be written: read and locked at once if it is there, changed by `begin` and later.
+    """A sweep's folder, opened to be written: read at once if it is there, changed by `begin` and later.
+
+    Who opens it holds its lock (`artde_gym.evaluation.lock`).
 
     Attributes:
         done: episodes that it holds.
         set_aside: files that are not as they had been written.
 
     Raises:
-        StoreError: if another process writes it, or it cannot be read.
+        StoreError: if it cannot be read.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -60,7 +61,7 @@ class SweepStore:
         self._types: parquet.Types = {}
         self._runs: list[dict[str, Any]] = []
         self._waiting: list[dict[str, Any]] = []
-        self._lock: Any = None
+        self._taken = False
         self._started = self._flushed = time.monotonic()
         if (folder / RECORD).exists() or _parts(folder):
             self._take()
@@ -69,31 +70,32 @@ class SweepStore:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        try:
-            if kind is None or not issubclass(kind, StoreError):  # a disk that is full is not tried once more
-                self.flush()
-        finally:
-            if self._lock is not None:
-                self._lock.close()
+        if kind is None or not issubclass(kind, StoreError):  # a disk that is full is not tried once more
+            self.flush()
 
-    def begin(self, sweep: str, types: parquet.Types) -> None:
+    def begin(
+        self, sweep: str, types: parquet.Types, behind: Mapping[str, str] | None = None, *, allow_mixed: bool = False
+    ) -> None:
         """Make the folder ready for episodes: what is corrupt goes aside, what an earlier process left half done goes.
 
         Args:
             sweep: what was asked for, as JSON.
             types: columns that episodes will have, as far as they are known.
+            behind: hashes of weights and code behind controllers.
+            allow_mixed: whether episodes that other software ran may be continued.
 
         Raises:
             StoreError: if the folder holds something else, episodes that other software ran, or cannot be written.
         """
-        run = {"sweep": json.loads(sweep), "provenance": provenance(), "complete": False}
+        before = self._runs[-1]["provenance"] if self.done and self._runs else None
+        made_by = continued(self.folder, before, provenance(behind), allow_mixed=allow_mixed)
+        run = {"sweep": json.loads(sweep), "provenance": made_by, "complete": False}
         with self._writing():
-            if self._lock is None:
+            if not self._taken:
                 self._clear(f".{RECORD}.*")
-                if claim(self.folder, RECORD, CONFIGURATION):
+                if claim(self.folder, RECORD, CONFIGURATION) is None:
                     self._write_record()
                 self._take()
-            self._check_software(run["provenance"])
             self._clear(f".{RECORD}.*", ".part-*")
             (self.folder / "episodes").mkdir(exist_ok=True)
             for path in self.set_aside:
@@ -143,17 +145,10 @@ class SweepStore:
             self._write_record()
 
     def _take(self) -> None:
-        """Lock the folder and read what is there."""
+        """Read what is there."""
         if _runs(self.folder) is None and not _parts(self.folder):
             raise _unreadable(self.folder)
-        with self._writing():
-            self._lock = (self.folder / "sweep.lock").open("ab")
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            self._lock.close()
-            allowed = "a folder that no other process writes: a sweep is running there"
-            raise StoreError("sweep folder", str(self.folder), allowed) from None
+        self._taken = True
         runs = _runs(self.folder)
         if runs is None and (self.folder / RECORD).exists():
             self.set_aside.append(self.folder / RECORD)  # the parts tell all that is needed
@@ -177,16 +172,6 @@ class SweepStore:
         for pattern in patterns:
             for path in self.folder.glob(pattern):
                 path.unlink()
-
-    def _check_software(self, now: Mapping[str, Any]) -> None:
-        """Episodes of one sweep are to be equal to the last bit, whenever they were run."""
-        if not (self.done and self._runs):
-            return
-        before, here = self._runs[-1]["provenance"]["packages"], now["packages"]
-        for name in DECISIVE:
-            if name in before and before[name] != here.get(name):
-                allowed = f"{before[name]}, which the episodes in {self.folder} were run with; or a new folder"
-                raise StoreError(f"version of {name}", here.get(name), allowed)
 
     def _widen(self, types: parquet.Types) -> None:
         """Give all parts the same columns."""

@@ -31,11 +31,13 @@ import pandas as pd
 from artde_gym.arguments import reading
 from artde_gym.errors import OptionError, StoreError
 from artde_gym.evaluation.environments import Backend, single, tracking_of
-from artde_gym.evaluation.evaluate import DEFAULT_ENVIRONMENT, Update, evaluate
-from artde_gym.evaluation.provenance import provenance
+from artde_gym.evaluation.evaluate import DEFAULT_ENVIRONMENT, Update, evaluate, policy_for
+from artde_gym.evaluation.identity import behind
+from artde_gym.evaluation.lock import is_empty, writes_folder
+from artde_gym.evaluation.provenance import MIXED, continued, provenance
 from artde_gym.evaluation.result import Result
-from artde_gym.evaluation.store import claim, write_atomically
-from artde_gym.registration import GainRange, search_space
+from artde_gym.evaluation.store import claim, plain_configuration, write_atomically
+from artde_gym.registration import GainRange, registered_controllers, search_space
 from artde_gym.scenarios import scenario as find_scenario
 
 RECORD = "tuning.json"
@@ -70,6 +72,7 @@ class Tuning:
     complete: bool = True
 
 
+@writes_folder
 def tune(
     controllers: Sequence[str],
     env_id: str | None = None,
@@ -84,13 +87,14 @@ def tune(
     disturbances: Mapping[str, Any] | None = None,
     env_kwargs: Mapping[str, Any] | None = None,
     backend: Backend = "single",
+    allow_mixed: bool = False,
     on_progress: Callable[[str, Update], None] | None = None,
 ) -> Tuning:
     """Tune every controller with the same budget, and compare each with its own preset on held-out seeds.
 
     Args:
         controllers: registered names.
-        env_id: as for `evaluate`, also for `disturbances`, `env_kwargs`, `backend` and `workers`.
+        env_id: as for `evaluate`, also for `disturbances`, `env_kwargs`, `backend`, `workers` and `allow_mixed`.
         scenario: one of `artde_gym.scenarios`; None for the environment as it is.
         trials: of each controller, the preset included.
         episodes: of each trial.
@@ -101,7 +105,7 @@ def tune(
 
     Raises:
         UnknownNameError, OptionError, DisturbanceError: for a bad argument, before the first trial.
-        StoreError: if `out` holds other results.
+        StoreError: if `out` holds other results, or results of other software, or is written by another process.
     """
     for name, count in (("trials", trials), ("episodes", episodes), ("held_out", held_out)):
         if not (isinstance(count, int) and count >= 1):
@@ -133,7 +137,7 @@ def tune(
         "held_out": held_out,
         "seed": seed,
     }
-    folder = None if out is None else _Folder(Path(out), configuration)
+    folder = None if out is None else _Folder(Path(out), configuration, _behind(controllers, env_id), allow_mixed)
     rows = [] if folder is None else folder.rows
 
     def run(what: str, labels: Mapping[str, str], gains: Mapping[str, Gains], **options: Any) -> Result:
@@ -159,11 +163,20 @@ def tune(
             folder.write(rows)
     best = _best(rows)
     tuned = {name + TUNED: best[name] for name in controllers}
-    place = {} if folder is None else {"out": folder.path / "held-out"}
+    place = {} if folder is None else {"out": folder.path / "held-out", "allow_mixed": allow_mixed}
     result = run("held-out", compared, tuned, episodes=held_out, seed=seed + 1, **place)
     if folder is not None:
         folder.finish(best, result.complete)
     return Tuning(_frame(rows), metric, best, result, None if folder is None else folder.path, result.complete)
+
+
+def _behind(controllers: Sequence[str], env_id: str) -> dict[str, str]:
+    """Weights and code behind the controllers, at their own gains."""
+    known, env = registered_controllers(), single(env_id, json.dumps({}))
+    found: dict[str, str] = {}
+    for name in controllers:
+        found |= behind(name, env_id, known[name], policy_for(known[name], env, {}))
+    return found
 
 
 class _Proposer:
@@ -238,15 +251,15 @@ def _parsed(row: Mapping[str, str]) -> dict[str, Any]:
 class _Folder:
     """The folder of one tuning; it is made with the first finished trial, so that a bad argument leaves none behind."""
 
-    def __init__(self, path: Path, configuration: Mapping[str, Any]) -> None:
+    def __init__(
+        self, path: Path, configuration: Mapping[str, Any], behind_them: Mapping[str, str], allow_mixed: bool
+    ) -> None:
         self.path = path
-        try:
-            self._configuration = json.loads(json.dumps(configuration))
-        except TypeError as error:
-            raise OptionError("disturbances, env_kwargs", configuration, "values that JSON can write") from error
+        self._configuration = plain_configuration(configuration)
+        self._provenance = provenance(behind_them)
         self.rows: list[dict[str, Any]] = []
-        if path.exists() and (not path.is_dir() or any(path.iterdir())):
-            claim(path, RECORD, self._configuration)
+        if path.exists() and not is_empty(path):
+            before = claim(path, RECORD, self._configuration)
             trials = path / "trials.csv"
             if trials.exists():
                 with reading("trials.csv", trials, "a table that `tune` wrote", StoreError):
@@ -258,10 +271,14 @@ class _Folder:
                             != self._configuration["controllers"][row["controller"]].keys()
                         ):
                             raise ValueError(f"gains of another law in a row of {row['controller']}")
+            begun = before if self.rows else None
+            self._provenance = continued(path, begun, self._provenance, allow_mixed=allow_mixed)
+            if MIXED in self._provenance:
+                self._write_record({}, complete=False)
 
     def write(self, rows: list[dict[str, Any]]) -> None:
         """Keep the finished trials."""
-        if claim(self.path, RECORD, self._configuration):
+        if claim(self.path, RECORD, self._configuration) is None:
             self._write_record({}, complete=False)
         text = _frame(rows).to_csv(index=False, lineterminator="\n")
         write_atomically(self.path / "trials.csv", lambda file: file.write(text.encode()))
@@ -273,7 +290,7 @@ class _Folder:
     def _write_record(self, best: Mapping[str, Gains], complete: bool) -> None:
         record = {
             "configuration": self._configuration,
-            "provenance": provenance(),
+            "provenance": self._provenance,
             "complete": complete,
             "best": best,
         }

@@ -1,0 +1,134 @@
+"""One writer for each folder: a lock that the system releases when its process dies, and that says who holds it.
+
+The lock is held on the file `.lock`, which is there as long as somebody writes; one that a killed process has left
+behind holds nobody up. A function that writes a folder is decorated by `writes_folder`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import datetime
+import fcntl
+import functools
+import inspect
+import json
+import os
+import platform
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import ParamSpec, TypeVar
+
+from artde_gym.errors import StoreError
+from artde_gym.evaluation.provenance import command
+
+LOCK = ".lock"
+
+_Arguments = ParamSpec("_Arguments")
+_Result = TypeVar("_Result")
+
+_held: set[tuple[int, Path]] = set()
+"""Folders that threads of this process hold: a function that holds one may call another one that writes it."""
+
+
+def writes_folder(function: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Result]:
+    """Let a function hold the folder that its argument `out` names for as long as it runs; None is no folder."""
+    signature = inspect.signature(function)
+
+    @functools.wraps(function)
+    def holding(*args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result:
+        out = signature.bind(*args, **kwargs).arguments.get("out")
+        with contextlib.nullcontext() if out is None else locked(Path(out)):
+            return function(*args, **kwargs)
+
+    return holding
+
+
+@contextlib.contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold a folder; it is made for that, and goes again if it stays empty.
+
+    Raises:
+        StoreError: if another process or thread holds it, or it cannot be written.
+    """
+    key = threading.get_ident(), folder.resolve()
+    if key in _held:
+        yield
+        return
+    made, handle = _acquire(folder)
+    _held.add(key)
+    try:
+        yield
+    finally:
+        _held.discard(key)
+        with contextlib.suppress(OSError):  # somebody has removed the folder
+            (folder / LOCK).unlink()
+            for empty in reversed(made):
+                empty.rmdir()
+        os.close(handle)
+
+
+def is_empty(folder: Path) -> bool:
+    """Return whether a folder holds nothing but its lock."""
+    return all(path.name == LOCK for path in folder.iterdir())
+
+
+def _acquire(folder: Path) -> tuple[list[Path], int]:
+    """The folders that were made for it, and the locked file."""
+    made: list[Path] = []
+    try:
+        while True:
+            made += _make(folder)
+            handle = _try_to_lock(folder)
+            if handle is not None:
+                return made, handle
+    except (FileExistsError, NotADirectoryError):
+        raise StoreError("output folder", str(folder), "a new or empty folder; this one holds something else") from None
+    except OSError as error:
+        raise StoreError("output folder", str(folder), f"a folder that can be written ({error})") from error
+
+
+def _make(folder: Path) -> list[Path]:
+    """Make a folder and all above it; those that were not there yet, the uppermost first."""
+    missing = [path for path in reversed([folder, *folder.parents]) if not path.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    return missing
+
+
+def _try_to_lock(folder: Path) -> int | None:
+    """The locked file; None if another process has just removed it, or the folder, and it is to be tried again."""
+    path = folder / LOCK
+    try:
+        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+    except FileNotFoundError:
+        return None
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if os.path.samestat(os.fstat(handle), os.stat(path)):
+            _sign(handle)
+            return handle
+    except BlockingIOError:
+        holder = _holder(handle)
+        os.close(handle)
+        raise StoreError("output folder", str(folder), f"a folder that nobody else writes; {holder} does") from None
+    except FileNotFoundError:
+        pass
+    os.close(handle)
+    return None
+
+
+def _sign(handle: int) -> None:
+    """Say in the file who holds it."""
+    now = datetime.datetime.now().astimezone().isoformat(sep=" ", timespec="seconds")
+    holder = {"pid": os.getpid(), "host": platform.node(), "since": now, "command": command()}
+    with contextlib.suppress(OSError):  # a full disk shows where results are written
+        os.ftruncate(handle, 0)
+        os.pwrite(handle, json.dumps(holder).encode(), 0)
+
+
+def _holder(handle: int) -> str:
+    try:
+        found = json.loads(os.pread(handle, 1 << 16, 0))
+        return f"process {found['pid']} on {found['host']} ({found['command']!r}, since {found['since']})"
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return "another process"
