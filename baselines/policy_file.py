@@ -11,7 +11,6 @@ import hashlib
 import io
 import itertools
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -50,6 +49,8 @@ def layout_hash(layout: Layout) -> str:
 
 def save(folder: Path, saved: Saved) -> None:
     """Write a policy; each of the two files is replaced at once, the description last."""
+    from artde_gym.evaluation.store import write_atomically  # not needed, nor waited for, where policies only act
+
     network = saved.network
     arrays = {"mean": network.mean, "variance": network.variance}
     for i, (weight, bias) in enumerate(network.layers):
@@ -74,8 +75,9 @@ def save(folder: Path, saved: Saved) -> None:
         "about": saved.about,
     }
     folder.mkdir(parents=True, exist_ok=True)
-    _replace(folder / WEIGHTS, buffer.getvalue())
-    _replace(folder / DESCRIPTION, (json.dumps(description, indent=2) + "\n").encode())
+    text = json.dumps(description, indent=2) + "\n"
+    write_atomically(folder / WEIGHTS, lambda file: file.write(buffer.getvalue()))
+    write_atomically(folder / DESCRIPTION, lambda file: file.write(text.encode()))
 
 
 def read(folder: Path) -> Saved:
@@ -121,9 +123,3 @@ def _network(content: bytes, sizes: list[int], squashed: bool) -> Network:
             for i, (before, after) in enumerate(itertools.pairwise(sizes))
         )
         return Network(checked("mean", (sizes[0],)), checked("variance", (sizes[0],)), layers, squashed)
-
-
-def _replace(file: Path, content: bytes) -> None:
-    part = file.with_name(f".{file.name}.part")
-    part.write_bytes(content)
-    os.replace(part, file)

@@ -20,6 +20,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv,
 
 from artde_gym.layout import Layout
 from baselines.checkpoint import Checkpoints
+from baselines.errors import TrainingError
 from baselines.export import exported
 from baselines.recipe import Recipe
 from baselines.residual import Residual
@@ -42,12 +43,15 @@ def train(training: Training, out: str | Path, on_progress: Callable[[Progress],
     a held-out test) and `policy/`, the best policy by the test's score.
 
     Raises:
-        TrainingError: if `out` holds a run of another configuration.
+        TrainingError: if `out` holds a run of another configuration, or for options that do not go together.
+        OptionError, DisturbanceError, UnknownNameError, GainError: for a bad argument; nothing has been written then.
     """
     run = Run(training, Path(out), on_progress)
     env, residual = environments(training, run)
     try:
-        Trainer(run, env, residual).go()
+        trainer = Trainer(run, env, residual)
+        run.begin(residual)
+        trainer.go()
     finally:
         env.close()
     return run.exported
@@ -61,8 +65,10 @@ class Trainer:
         training, task = run.training, run.task
         options = {**(task.ppo if training.algo == "ppo" else task.sac), **training.options}
         self.env = VecNormalize(VecMonitor(env), gamma=options["gamma"])
-        self.model = _model(training, self.env, options, residual.features)
-        self.model.set_logger(configure(str(run.folder / "tensorboard"), ["tensorboard"]))
+        try:
+            self.model = _model(training, self.env, options, residual.features)
+        except (AssertionError, TypeError, ValueError, MemoryError) as error:  # Stable-Baselines3's own checks
+            raise TrainingError("options", options, f"arguments that go together ({error})") from error
         self.interval = SAC_INTERVAL
         if training.algo == "ppo":
             self.interval = task.rollouts * options["n_steps"] * env.num_envs
@@ -74,6 +80,7 @@ class Trainer:
 
     def go(self) -> None:
         run, training = self.run, self.run.training
+        self.model.set_logger(configure(str(run.folder / "tensorboard"), ["tensorboard"]))
         self._report(self.steps)
         while self.steps < training.steps and run.state["stale"] < training.patience:
             self.learn()
