@@ -23,6 +23,7 @@ from artde_gym.evaluation import evaluate
 from artde_gym.evaluation.environments import Backend
 from artde_gym.evaluation.evaluate import cells_of, tried
 from artde_gym.evaluation.store import write_atomically
+from artde_gym.evaluation.workers import check_workers
 from baselines.errors import TrainingError
 from baselines.network import Network
 from baselines.options import ALGORITHMS, check_options
@@ -115,6 +116,7 @@ class Run:
     """
 
     def __init__(self, training: Training, folder: Path, on_progress: Callable[[Progress], None] | None = None) -> None:
+        check_workers(training.workers)
         self.training, self.folder, self.task = training, folder, task(training.env_id)
         self._on_progress = on_progress or (lambda _: None)
         self.state: dict[str, Any] = {"best": None, "stale": 0, "tests": []}

@@ -18,6 +18,8 @@ from stable_baselines3.common.logger import configure
 from stable_baselines3.common.utils import set_random_seed
 from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv, VecMonitor, VecNormalize
 
+from artde_gym.errors import WorkerError
+from artde_gym.evaluation.workers import GUARD, ignored_interrupt
 from artde_gym.layout import Layout
 from baselines.checkpoint import Checkpoints
 from baselines.errors import TrainingError
@@ -153,7 +155,17 @@ def environments(training: Training, run: Run) -> tuple[VecEnv, Residual]:
         functools.partial(_worker_env, training.env_id, kwargs, training.recipe) for _ in range(count)
     ]
     residual = single(training.env_id, kwargs, training.recipe).residual
-    return (DummyVecEnv(makers) if training.workers == 1 else SubprocVecEnv(makers, start_method="spawn")), residual
+    return (DummyVecEnv(makers) if training.workers == 1 else _processes(makers)), residual
+
+
+def _processes(makers: list[Callable[[], gym.Env[Any, Any]]]) -> VecEnv:
+    """Environments in processes of their own."""
+    try:
+        with ignored_interrupt():
+            return SubprocVecEnv(makers, start_method="spawn")
+    except (EOFError, ConnectionError) as error:  # it does not say what its processes ended with
+        allowed = f"workers that live: if memory is short, take fewer of them; they need {GUARD}"
+        raise WorkerError("worker processes", "ended when they had just started", allowed) from error
 
 
 def _worker_env(env_id: str, kwargs: dict[str, Any], recipe: Recipe) -> ResidualEnv:

@@ -43,6 +43,7 @@ from artde_gym.evaluation.frontier_standard import Harder, standard_test
 from artde_gym.evaluation.provenance import provenance
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.evaluation.store import claim, write_atomically
+from artde_gym.evaluation.workers import check_workers
 
 RECORD = "frontier.json"
 TRACE_HZ = 10.0  # a frontier has hundreds of episodes; their traces are for a look at a fall, not for metrics
@@ -127,6 +128,7 @@ def frontier(
         UnknownNameError, OptionError, DisturbanceError, GainError: for a bad argument, before the first episode.
         StoreError: if `out` holds other results.
     """
+    check_workers(workers)
     if not (isinstance(survival, (int, float)) and 0 < survival <= 1):
         raise OptionError("survival", survival, "above 0 up to 1")
     named = _named(controllers)

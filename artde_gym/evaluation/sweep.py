@@ -32,7 +32,7 @@ from artde_gym.evaluation.ray_workers import run_on_ray
 from artde_gym.evaluation.rollout import Episode
 from artde_gym.evaluation.sweep_design import Design, Point, design, read
 from artde_gym.evaluation.sweep_store import Key, SweepStore, read_sweep
-from artde_gym.evaluation.workers import Runs, run_here, run_parallel
+from artde_gym.evaluation.workers import Runs, check_workers, run_here, run_parallel
 
 Executor = Literal["local", "ray"]
 """Processes of this machine, or a Ray cluster."""
@@ -88,8 +88,7 @@ def sweep(
         StoreError: if `out` holds anything else, is used by another process, or cannot be written (a full disk).
         WorkerError: if workers keep ending before their episodes do.
     """
-    if not (isinstance(workers, int) and workers >= 1):
-        raise OptionError("workers", workers, "a whole number >= 1")
+    check_workers(workers)
     if executor not in get_args(Executor):
         allowed = f"{among(executor, get_args(Executor))}; a physics engine is an argument of environments (env_kwargs)"
         raise OptionError("executor", executor, allowed)

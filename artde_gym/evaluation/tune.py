@@ -36,6 +36,7 @@ from artde_gym.evaluation.provenance import provenance
 from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.scenarios import scenario as find_scenario
 from artde_gym.evaluation.store import claim, write_atomically
+from artde_gym.evaluation.workers import check_workers
 from artde_gym.registration import GainRange, search_space
 
 RECORD = "tuning.json"
@@ -103,6 +104,7 @@ def tune(
         UnknownNameError, OptionError, DisturbanceError: for a bad argument, before the first trial.
         StoreError: if `out` holds other results.
     """
+    check_workers(workers)
     for name, count in (("trials", trials), ("episodes", episodes), ("held_out", held_out)):
         if not (isinstance(count, int) and count >= 1):
             raise OptionError(name, count, "a whole number >= 1")
