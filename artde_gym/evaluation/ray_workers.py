@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import socket
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -11,6 +12,9 @@ from artde_gym.errors import OptionError, WorkerError
 from artde_gym.evaluation.provenance import DECISIVE, versions
 from artde_gym.evaluation.workers import AHEAD, PATIENCE, Job, Runs, Work
 
+ANSWER = 5.0  # s until a cluster has answered
+SETTINGS = b"\x04"  # type of the first frame of a gRPC server, as of any that speaks HTTP/2
+HELLO = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + b"\0\0\0" + SETTINGS + b"\0" * 5
 RETRIES = 3  # of a job whose worker or node is lost
 STORE = 80 * 2**20  # bytes of shared memory for a cluster on this machine: results are a few kB
 
@@ -67,6 +71,8 @@ def _ray() -> Any:
 def _connect(ray: Any, address: str | None, workers: int) -> None:
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nobody is told what runs here, unless the user wants it
     own = {"num_cpus": workers, "object_store_memory": STORE, "include_dashboard": False} if address is None else {}
+    if address is not None:
+        _check_answers(ray, address)
     try:
         ray.init(address or "local", log_to_driver=False, logging_level="ERROR", **own)
     except Exception as error:  # it raises these, too
@@ -74,6 +80,37 @@ def _connect(ray: Any, address: str | None, workers: int) -> None:
         if address is None:
             raise WorkerError("Ray", reason, "a machine on which it starts, within 30 s") from error
         raise OptionError("address", address, f"that of a running Ray cluster ({reason})") from error
+
+
+def _check_answers(ray: Any, address: str) -> None:
+    """See that something at an address speaks as Ray does; Ray itself takes minutes to find that nothing does.
+
+    Raises:
+        OptionError: if it does not.
+    """
+    where = os.environ.get("RAY_ADDRESS", address) if address == "auto" else address
+    host, _, port = where.removeprefix("ray://").rpartition(":")
+    if not (host and port.isdigit()):
+        return  # Ray looks for it itself
+    hosts = [host.strip("[]")]
+    if host in ("localhost", "127.0.0.1"):
+        hosts.append(ray.util.get_node_ip_address())  # Ray listens there, and takes the other name for it
+    reasons = [reason for one in hosts if (reason := _silence(one, int(port)))]
+    if len(reasons) == len(hosts):
+        allowed = f"that of a running Ray cluster, which answers within {ANSWER:g} s ({reasons[-1]})"
+        raise OptionError("address", address, allowed)
+
+
+def _silence(host: str, port: int) -> str:
+    """Why there is no gRPC server, in words; empty if there is one."""
+    try:
+        with socket.create_connection((host, port), timeout=ANSWER) as connection:
+            connection.sendall(HELLO)
+            answer = connection.recv(64)
+    except (OSError, OverflowError, UnicodeError) as error:
+        return str(error)
+    encrypted = os.environ.get("RAY_USE_TLS", "0") not in ("", "0")
+    return "" if encrypted or answer[3:4] == SETTINGS else "it is something else"
 
 
 def _cores(ray: Any) -> int:
