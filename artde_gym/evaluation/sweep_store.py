@@ -28,9 +28,9 @@ import pandas as pd
 from artde_gym.errors import StoreError
 from artde_gym.evaluation import sweep_part
 from artde_gym.evaluation.provenance import DECISIVE, provenance
-from artde_gym.evaluation.store import claim, write_atomically
+from artde_gym.evaluation.store import write_atomically
 
-RECORD = "sweep.json"
+RECORD, LOCK = "sweep.json", "sweep.lock"
 CONFIGURATION = {"format": "artde-gym sweep", "schema": sweep_part.SCHEMA}
 SHORTEST, SHARE, LONGEST = 1.0, 0.01, 30.0  # s, of the run's time, s: how long a part waits for more episodes
 
@@ -89,10 +89,7 @@ class SweepStore:
         run = {"sweep": json.loads(sweep), "provenance": provenance(), "complete": False}
         with self._writing():
             if self._lock is None:
-                self._clear(f".{RECORD}.*")
-                if claim(self.folder, RECORD, CONFIGURATION):
-                    self._write_record()
-                self._take()
+                self._found()
             self._check_software(run["provenance"])
             self._clear(f".{RECORD}.*", ".part-*")
             (self.folder / "episodes").mkdir(exist_ok=True)
@@ -146,14 +143,34 @@ class SweepStore:
         """Lock the folder and read what is there."""
         if _runs(self.folder) is None and not _parts(self.folder):
             raise _unreadable(self.folder)
+        self._lock_folder()
+        self._read_folder()
+
+    def _found(self) -> None:
+        """Lock a new folder and make it this sweep's; of two sweeps that begin together, one gets it."""
+        names = {path.name for path in self.folder.iterdir()} if self.folder.exists() else set()
+        others = {name for name in names if name != LOCK and not name.startswith(f".{RECORD}.")}
+        if others and RECORD not in names:
+            raise StoreError("sweep folder", str(self.folder), "a new or empty folder; this one holds something else")
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self._lock_folder()
+        if (self.folder / RECORD).exists():
+            allowed = "a folder that no other process writes: a sweep has begun there; the same command continues it"
+            raise StoreError("sweep folder", str(self.folder), allowed)
+        self._clear(f".{RECORD}.*")
+        self._write_record()
+
+    def _lock_folder(self) -> None:
         with self._writing():
-            self._lock = (self.folder / "sweep.lock").open("ab")
+            self._lock = (self.folder / LOCK).open("ab")
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             self._lock.close()
             allowed = "a folder that no other process writes: a sweep is running there"
             raise StoreError("sweep folder", str(self.folder), allowed) from None
+
+    def _read_folder(self) -> None:
         runs = _runs(self.folder)
         if runs is None and (self.folder / RECORD).exists():
             self.set_aside.append(self.folder / RECORD)  # the parts tell all that is needed

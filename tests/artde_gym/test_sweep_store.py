@@ -288,6 +288,44 @@ def test_two_processes_do_not_write_one_folder(tmp_path, whole):
         pass
 
 
+TOGETHER = """
+import os, sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+import test_sweep_store as tests
+from artde_gym.errors import StoreError
+
+for number in range(10):
+    (begin, start), (report, answer) = os.pipe(), os.pipe()
+    for child in range(3):
+        if os.fork() == 0:
+            folder = Path(sys.argv[2]) / str(number)
+            try:
+                with tests.SweepStore(folder) as store:
+                    os.close(start)
+                    os.read(begin, 1)  # until all have looked into the folder
+                    store.begin("{}", {})
+                    store.add(tests.FIRST)
+            except StoreError as error:
+                os.write(answer, f"{error}\\n".encode())
+            os._exit(0)
+    os.close(begin), os.close(start), os.close(answer)
+    for child in range(3):
+        os.wait()
+    print(os.read(report, 10_000).decode(), end="")
+    assert len(tests.read_sweep(Path(sys.argv[2]) / str(number))) == 2
+"""
+
+
+def test_of_sweeps_that_begin_together_one_runs_and_the_others_say_so(tmp_path):
+    arguments = [sys.executable, "-c", TOGETHER, str(Path(__file__).parent), str(tmp_path)]
+    outcome = subprocess.run(arguments, capture_output=True, text=True, timeout=100, check=False)
+    assert outcome.returncode == 0, outcome.stderr
+    lines = outcome.stdout.splitlines()
+    assert len(lines) == 20
+    assert all("a sweep is running there" in line or "the same command continues it" in line for line in lines)
+
+
 def test_every_run_leaves_its_provenance(tmp_path, whole):
     stored(tmp_path / "whole", [row(9)])
     record = json.loads((tmp_path / "whole" / "sweep.json").read_text())
