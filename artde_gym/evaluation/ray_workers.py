@@ -5,6 +5,8 @@ from __future__ import annotations
 import itertools
 import os
 import socket
+import subprocess
+import sys
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -12,7 +14,9 @@ from artde_gym.errors import OptionError, WorkerError
 from artde_gym.evaluation.provenance import DECISIVE, versions
 from artde_gym.evaluation.workers import AHEAD, PATIENCE, Job, Runs, Work
 
-ANSWER = 5.0  # s until a cluster has answered
+ANSWER = 4.0  # s until a cluster has answered
+JOINED = 14.0  # s until a process has joined it
+JOIN = "import ray, sys; ray.init(sys.argv[1], log_to_driver=False, logging_level='ERROR')"
 SETTINGS = b"\x04"  # type of the first frame of a gRPC server, as of any that speaks HTTP/2
 HELLO = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + b"\0\0\0" + SETTINGS + b"\0" * 5
 RETRIES = 3  # of a job whose worker or node is lost
@@ -71,8 +75,6 @@ def _ray() -> Any:
 def _connect(ray: Any, address: str | None, workers: int) -> None:
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nobody is told what runs here, unless the user wants it
     own = {"num_cpus": workers, "object_store_memory": STORE, "include_dashboard": False} if address is None else {}
-    if address is not None:
-        _check_answers(ray, address)
     try:
         ray.init(address or "local", log_to_driver=False, logging_level="ERROR", **own)
     except Exception as error:  # it raises these, too
@@ -82,12 +84,15 @@ def _connect(ray: Any, address: str | None, workers: int) -> None:
         raise OptionError("address", address, f"that of a running Ray cluster ({reason})") from error
 
 
-def _check_answers(ray: Any, address: str) -> None:
-    """See that something at an address speaks as Ray does; Ray itself takes minutes to find that nothing does.
+def check_address(address: str) -> None:
+    """See that there is a cluster at an address; Ray itself takes minutes to find that there is none.
 
     Raises:
-        OptionError: if it does not.
+        OptionError: without Ray, or if a process cannot join one within 20 s.
     """
+    ray = _ray()
+    if ray.is_initialized():
+        return
     where = os.environ.get("RAY_ADDRESS", address) if address == "auto" else address
     host, _, port = where.removeprefix("ray://").rpartition(":")
     if not (host and port.isdigit()):
@@ -95,10 +100,20 @@ def _check_answers(ray: Any, address: str) -> None:
     hosts = [host.strip("[]")]
     if host in ("localhost", "127.0.0.1"):
         hosts.append(ray.util.get_node_ip_address())  # Ray listens there, and takes the other name for it
-    reasons = [reason for one in hosts if (reason := _silence(one, int(port)))]
-    if len(reasons) == len(hosts):
-        allowed = f"that of a running Ray cluster, which answers within {ANSWER:g} s ({reasons[-1]})"
-        raise OptionError("address", address, allowed)
+    reasons = [_silence(one, int(port)) for one in hosts]
+    reason = _refusal(address) if "" in reasons else reasons[-1]
+    if reason:
+        raise OptionError("address", address, f"that of a running Ray cluster, which answers within 20 s ({reason})")
+
+
+def _refusal(address: str) -> str:
+    """Why a process cannot join a cluster in time, in words; empty if one can."""
+    command = [sys.executable, "-c", JOIN, address]
+    try:
+        outcome = subprocess.run(command, capture_output=True, text=True, timeout=JOINED, check=False)
+    except subprocess.TimeoutExpired:
+        return "it does not let a process join"
+    return "" if outcome.returncode == 0 else (outcome.stderr.strip().splitlines() or ["no reason given"])[-1]
 
 
 def _silence(host: str, port: int) -> str:

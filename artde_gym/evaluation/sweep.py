@@ -28,7 +28,7 @@ from artde_gym.evaluation.evaluate import (
     run_task,
     tried,
 )
-from artde_gym.evaluation.ray_workers import run_on_ray
+from artde_gym.evaluation.ray_workers import check_address, run_on_ray
 from artde_gym.evaluation.rollout import Episode
 from artde_gym.evaluation.sweep_design import Design, Point, design, read
 from artde_gym.evaluation.sweep_store import Key, SweepStore, read_sweep
@@ -95,6 +95,8 @@ def sweep(
     if address is not None and executor != "ray":
         raise OptionError("address", address, "none without executor 'ray'")
     sweep_part.pyarrow()
+    if address is not None:
+        check_address(address)
     plan = design(read(given) if isinstance(given, (str, Path)) else given)
     types = sweep_part.types_of(point.columns for point in plan.points)
     points = {f"{point.cell.name} [{i}]": point for i, point in enumerate(plan.points)}
