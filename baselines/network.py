@@ -15,6 +15,7 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
+from artde_gym.errors import OptionError
 from controllers.laws.tracking import Array
 
 Float = NDArray[np.float32]
@@ -31,12 +32,21 @@ class Network:
         mean, variance: of the features, (n,).
         layers: (W (inputs, outputs), b (outputs,)) of each layer, the last one linear.
         squashed: whether the last one is followed by tanh, as SAC's actor has it.
+
+    Raises:
+        OptionError: without layers, or for a variance that is not finite and >= 0.
     """
 
     mean: Float
     variance: Float
     layers: tuple[tuple[Float, Float], ...]
     squashed: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.layers:
+            raise OptionError("layers", self.layers, "at least one")
+        if not (np.isfinite(self.variance) & (self.variance >= 0.0)).all():
+            raise OptionError("smallest variance", float(self.variance.min()), "finite numbers >= 0")
 
     @functools.cached_property
     def _scale(self) -> Float:

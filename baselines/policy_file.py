@@ -11,22 +11,22 @@ import hashlib
 import io
 import itertools
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 import artde_gym
-from artde_gym.arguments import reading
+from artde_gym.arguments import file_name, flag, number, reading
 from artde_gym.layout import Layout
 from baselines.errors import PolicyFileError
 from baselines.network import Network
-from baselines.recipe import Recipe
+from baselines.recipe import LONGEST, Recipe
 
 VERSION = 1
 DESCRIPTION, WEIGHTS = "policy.json", "weights.npz"
+T = TypeVar("T")
 
 
 class Saved(NamedTuple):
@@ -50,6 +50,8 @@ def layout_hash(layout: Layout) -> str:
 
 def save(folder: Path, saved: Saved) -> None:
     """Write a policy; each of the two files is replaced at once, the description last."""
+    from artde_gym.evaluation.store import write_atomically  # not needed, nor waited for, where policies only act
+
     network = saved.network
     arrays = {"mean": network.mean, "variance": network.variance}
     for i, (weight, bias) in enumerate(network.layers):
@@ -74,8 +76,9 @@ def save(folder: Path, saved: Saved) -> None:
         "about": saved.about,
     }
     folder.mkdir(parents=True, exist_ok=True)
-    _replace(folder / WEIGHTS, buffer.getvalue())
-    _replace(folder / DESCRIPTION, (json.dumps(description, indent=2) + "\n").encode())
+    text = json.dumps(description, indent=2) + "\n"
+    write_atomically(folder / WEIGHTS, lambda file: file.write(buffer.getvalue()))
+    write_atomically(folder / DESCRIPTION, lambda file: file.write(text.encode()))
 
 
 def read(folder: Path) -> Saved:
@@ -87,25 +90,54 @@ def read(folder: Path) -> Saved:
     with reading("policy", folder, f"a folder with {DESCRIPTION} and {WEIGHTS}", PolicyFileError):
         description = json.loads((folder / DESCRIPTION).read_text(encoding="utf-8"))
         content = (folder / WEIGHTS).read_bytes()
-    if not isinstance(description, Mapping) or description.get("version") != VERSION:
-        found = description.get("version") if isinstance(description, Mapping) else None
-        raise PolicyFileError(f"version of {folder / DESCRIPTION}", found, f"{VERSION}, what this release reads")
+    if not isinstance(description, Mapping):
+        raise PolicyFileError("description", str(folder / DESCRIPTION), "a JSON object")
+    version = description.get("version")
+    if not (type(version) is int and version == VERSION):
+        raise PolicyFileError(f"version of {folder / DESCRIPTION}", version, f"{VERSION}, what this release reads")
     if hashlib.sha256(content).hexdigest() != description.get("weights_sha256"):
         raise PolicyFileError("weights", str(folder / WEIGHTS), f"the file that {DESCRIPTION} was written with")
     with reading("policy", folder, "what `baselines` writes", PolicyFileError):
-        recipe = Recipe(**description["recipe"])
-        sizes = description["network"]["sizes"]
-        network = _network(content, sizes, bool(description["network"]["squashed"]))
-        return Saved(
-            str(description["name"]),
-            recipe,
-            network,
-            str(description["features_sha256"]),
-            tuple(description["actions"]),
-            float(description["control_period"]),
-            str(description["nominal_robot"]),
-            dict(description["about"]),
+        return _saved(description, content)
+
+
+def _saved(description: Mapping[str, Any], content: bytes) -> Saved:
+    """A policy from what its two files hold, every field checked."""
+    shape = _of("network", description["network"], dict)
+    if shape["activation"] != "tanh":
+        raise PolicyFileError("network: activation", shape["activation"], "'tanh'")
+    return Saved(
+        file_name("name", description["name"]),
+        Recipe(**_of("recipe", description["recipe"], dict)),
+        _network(content, _sizes(shape["sizes"]), flag("network: squashed", shape["squashed"])),
+        _of("features_sha256", description["features_sha256"], str),
+        tuple(_of("actions", name, str) for name in _of("actions", description["actions"], list)),
+        number(
+            "control_period", description["control_period"], 1e-6, LONGEST, f"a number from 1e-6 to {LONGEST:g} (s)"
+        ),
+        _of("nominal_robot", description["nominal_robot"], str),
+        _of("about", description["about"], dict),
+    )
+
+
+def _of(field: str, value: Any, kind: type[T]) -> T:
+    """The value, if it is of that kind.
+
+    Raises:
+        PolicyFileError: if it is not.
+    """
+    if not isinstance(value, kind):
+        raise PolicyFileError(field, value, f"a JSON {'object' if kind is dict else kind.__name__}")
+    return value
+
+
+def _sizes(value: Any) -> list[int]:
+    good = isinstance(value, list) and len(value) >= 2 and all(type(size) is int and size >= 1 for size in value)
+    if not good:
+        raise PolicyFileError(
+            "network: sizes", value, "whole numbers >= 1, at least of what goes in and of what comes out"
         )
+    return value
 
 
 def _network(content: bytes, sizes: list[int], squashed: bool) -> Network:
@@ -121,9 +153,3 @@ def _network(content: bytes, sizes: list[int], squashed: bool) -> Network:
             for i, (before, after) in enumerate(itertools.pairwise(sizes))
         )
         return Network(checked("mean", (sizes[0],)), checked("variance", (sizes[0],)), layers, squashed)
-
-
-def _replace(file: Path, content: bytes) -> None:
-    part = file.with_name(f".{file.name}.part")
-    part.write_bytes(content)
-    os.replace(part, file)

@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from artde_gym.arguments import flag, number
 from artde_gym.errors import OptionError, among
 
 HOLDS = {"ojas": 0.02, "q450": 0.015}
@@ -14,6 +15,8 @@ HOLDS = {"ojas": 0.02, "q450": 0.015}
 CHANNELS = {"ojas": ("synergies", "wide-synergies", "joints"), "q450": ("attitude", "position", "cascade")}
 """What an action may mean, by robot; the first one is the default."""
 NO_BASE = "none"
+LONGEST = 10.0  # s, of a hold
+LARGEST = 1e6  # of a limit
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,22 +46,21 @@ class Recipe:
     gated: bool = True
 
     def __post_init__(self) -> None:
-        if self.robot not in CHANNELS:
+        if not (isinstance(self.robot, str) and self.robot in CHANNELS):
             raise OptionError("robot", self.robot, among(self.robot, CHANNELS))
-        defaults = {
-            "channel": CHANNELS[self.robot][0],
-            "hold": HOLDS[self.robot],
-            "limit": LIMITS[self.channel or CHANNELS[self.robot][0]],
-        }
-        for field, default in defaults.items():
-            if not getattr(self, field):
-                object.__setattr__(self, field, default)
-        if self.channel not in CHANNELS[self.robot]:
-            raise OptionError("channel", self.channel, among(self.channel, CHANNELS[self.robot]))
-        for field in ("hold", "limit"):
-            value = getattr(self, field)
-            if not (isinstance(value, (int, float)) and math.isfinite(value) and value > 0):
-                raise OptionError(field, value, "a finite number > 0")
+        known = CHANNELS[self.robot]
+        if self.channel not in ("", *known):
+            raise OptionError("channel", self.channel, among(self.channel, known))
+        if not isinstance(self.base, str):
+            raise OptionError("base", self.base, "a name")
+        if not (isinstance(self.gains, Mapping) and all(isinstance(name, str) for name in self.gains)):
+            raise OptionError("gains", self.gains, "a mapping of names to values")
+        channel = self.channel or known[0]
+        object.__setattr__(self, "channel", channel)
+        for field, default, most in (("hold", HOLDS[self.robot], LONGEST), ("limit", LIMITS[channel], LARGEST)):
+            value = number(field, getattr(self, field), 0.0, most, f"a number > 0, up to {most:g}; 0 for the default")
+            object.__setattr__(self, field, value or default)
+        object.__setattr__(self, "gated", flag("gated", self.gated))
 
     def periods(self, control_period: float) -> int:
         """Control periods (of so many s) between two decisions.

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import io
 import json
 import platform
+import tempfile
 from collections.abc import Callable, Mapping
 from importlib import metadata
 from pathlib import Path
@@ -15,19 +17,25 @@ import gymnasium as gym
 import numpy as np
 
 import artde_gym
-from artde_gym.arguments import reading
+from artde_gym.arguments import number, reading
 from artde_gym.errors import among
 from artde_gym.evaluation import evaluate
+from artde_gym.evaluation.environments import Backend
+from artde_gym.evaluation.evaluate import cells_of, tried
+from artde_gym.evaluation.store import write_atomically
+from artde_gym.evaluation.workers import check_workers
 from baselines.errors import TrainingError
 from baselines.network import Network
+from baselines.options import ALGORITHMS, check_options
 from baselines.policy_file import Saved, layout_hash, save
 from baselines.recipe import Recipe
-from baselines.residual import Residual
+from baselines.residual import Residual, ResidualPolicy
 from baselines.residual_env import ResidualEnv
 from baselines.saved import EXPORT, load, nominal_name
 from baselines.tasks import HELD_OUT, task
 
-ALGORITHMS = ("ppo", "sac", "cma-es")
+RECORD = "run.json"
+LARGEST_SEED = 2**32 - 1  # that NumPy's older generators take, and with them Stable-Baselines3 and CMA-ES
 LABELS = {"cma-es": "balance"}
 """What stands behind the base's name in that of a policy, where it is not the algorithm."""
 
@@ -72,12 +80,15 @@ class Training:
             raise TrainingError("algo", self.algo, among(self.algo, ALGORITHMS))
         counts = {"steps": self.steps, "workers": self.workers, "test_every": self.test_every, "envs": self.envs or 1}
         for field, value in {**counts, "patience": self.patience}.items():
-            if not (isinstance(value, int) and value >= 1):
+            if not (type(value) is int and value >= 1):
                 raise TrainingError(field, value, "a whole number >= 1")
-        if not (isinstance(self.seed, int) and self.seed >= 0):
-            raise TrainingError("seed", self.seed, "a whole number >= 0")
+        if not (type(self.seed) is int and 0 <= self.seed <= LARGEST_SEED):
+            raise TrainingError("seed", self.seed, f"a whole number from 0 to {LARGEST_SEED}")
+        if self.level is not None:
+            number("level", self.level, 0.0, 1.0, "a number from 0 to 1, or None")
         if self.recipe.robot != task(self.env_id).robot:
             raise TrainingError("robot of the recipe", self.recipe.robot, f"{task(self.env_id).robot!r}")
+        check_options(self.algo, self.options)
 
 
 class Progress(NamedTuple):
@@ -89,11 +100,11 @@ class Progress(NamedTuple):
 
 
 class Run:
-    """A run in its folder.
+    """A run and its folder, which `begin` claims; until then nothing is written.
 
     Args:
         training: what is trained.
-        folder: claimed for it.
+        folder: of the run.
         on_progress: called now and then.
 
     Attributes:
@@ -101,19 +112,29 @@ class Run:
 
     Raises:
         TrainingError: if the folder holds a run of another configuration.
+        OptionError, DisturbanceError, gymnasium.error.Error: for arguments that the environment does not take.
     """
 
     def __init__(self, training: Training, folder: Path, on_progress: Callable[[Progress], None] | None = None) -> None:
+        check_workers(training.workers)
         self.training, self.folder, self.task = training, folder, task(training.env_id)
         self._on_progress = on_progress or (lambda _: None)
         self.state: dict[str, Any] = {"best": None, "stale": 0, "tests": []}
-        _claim(folder, json.loads(json.dumps(dataclasses.asdict(training))), {"workers"} if self.batched else set())
+        self._configuration = _plain(training)
+        _refuse_others(folder, self._configuration, {"workers"} if self.batched else set())
+        (cell,) = cells_of(training.env_id, None, environment_kwargs(training), self.task.test)
+        tried(self.backend, cell)
 
     @property
     def batched(self) -> bool:
         """Whether all environments are one batch: quadrotors always, bipeds in MuJoCo."""
         engine = self.task.batch_engine
         return engine is None or environment_kwargs(self.training).get("engine") == engine
+
+    @property
+    def backend(self) -> Backend:
+        """The backend of the held-out tests."""
+        return "batch" if self.batched else "single"
 
     @property
     def exported(self) -> Path:
@@ -126,11 +147,58 @@ class Run:
         text += "" if best is None else f", best test {best:.4g}"
         self._on_progress(Progress(min(steps, self.training.steps), self.training.steps, text))
 
+    def begin(self, residual: Residual) -> None:
+        """Make the folder this run's, once a held-out episode without a residual has shown that tests will work.
+
+        Raises:
+            TrainingError: for a base that a policy's file could not hold.
+        """
+        if isinstance(residual.base, ResidualPolicy):
+            raise TrainingError(
+                "base", self.training.recipe.base, "a law; a policy's file does not hold another policy"
+            )
+        if not self.state["tests"]:
+            size, count = residual.features.size, len(residual.actions)
+            layer = np.zeros((size, count), np.float32), np.zeros(count, np.float32)
+            nothing = Network(np.zeros(size, np.float32), np.ones(size, np.float32), (layer,))
+            with tempfile.TemporaryDirectory() as folder:
+                self._judge(self._saved(nothing, residual, 0), Path(folder), 1, 1)
+        _claim(self.folder, self._configuration)
+
     def test(self, network: Network, residual: Residual, steps: int, more: Mapping[str, float]) -> dict[str, float]:
         """Judge a network on the held-out episodes, and keep it if it is the best so far; returns what was found."""
-        training, state = self.training, self.state
-        kwargs = environment_kwargs(training)
-        saved = Saved(
+        state, saved = self.state, self._saved(network, residual, steps)
+        found = self._judge(saved, self.folder / "candidate", self.task.episodes, self.training.workers)
+        score = found["score"]
+        found = {"steps": steps, **found, **more}
+        state["tests"].append(found)
+        _write_rows(self.folder / "learning_curve.csv", state["tests"])
+        if state["best"] is None or score > state["best"]:
+            state["best"], state["stale"] = score, 0
+            save(self.exported, saved)
+        else:
+            state["stale"] += 1
+        return found
+
+    def _judge(self, saved: Saved, folder: Path, episodes: int, workers: int) -> dict[str, float]:
+        """Score and means of a policy on the first held-out episodes, by way of its file in `folder`."""
+        save(folder, saved)
+        rows = evaluate(
+            [load(folder)],
+            self.training.env_id,
+            disturbances=self.task.test,
+            env_kwargs=environment_kwargs(self.training),
+            episodes=episodes,
+            seed=HELD_OUT,
+            workers=workers,
+            backend=self.backend,
+        ).episodes
+        means = {name: float(np.mean(rows[name].to_numpy())) for name in _SHOWN if name in rows}
+        return {"score": self.task.score(rows), **means}
+
+    def _saved(self, network: Network, residual: Residual, steps: int) -> Saved:
+        training, kwargs = self.training, environment_kwargs(self.training)
+        return Saved(
             f"{training.recipe.base}+{LABELS.get(training.algo, training.algo)}",
             training.recipe,
             network,
@@ -147,29 +215,6 @@ class Run:
                 "versions": versions(),
             },
         )
-        candidate = self.folder / "candidate"
-        save(candidate, saved)
-        rows = evaluate(
-            [load(candidate)],
-            training.env_id,
-            disturbances=self.task.test,
-            env_kwargs=kwargs,
-            episodes=self.task.episodes,
-            seed=HELD_OUT,
-            workers=training.workers,
-            backend="batch" if self.batched else "single",
-        ).episodes
-        score = self.task.score(rows)
-        means = {name: float(np.mean(rows[name].to_numpy())) for name in _SHOWN if name in rows}
-        found = {"steps": steps, "score": score, **means, **more}
-        state["tests"].append(found)
-        _write_rows(self.folder / "learning_curve.csv", state["tests"])
-        if state["best"] is None or score > state["best"]:
-            state["best"], state["stale"] = score, 0
-            save(self.exported, saved)
-        else:
-            state["stale"] += 1
-        return found
 
 
 _SHOWN = ("fell", "duration_s", "rmse_m", "reward")
@@ -185,18 +230,36 @@ def single(env_id: str, kwargs: dict[str, Any], recipe: Recipe) -> ResidualEnv:
     return ResidualEnv(gym.make(env_id, disable_env_checker=True, **kwargs), recipe)
 
 
-def _claim(folder: Path, configuration: dict[str, Any], free: set[str]) -> None:
-    """Make a folder this run's, or see that it is; what `free` names may change, as may steps, options and patience."""
-    file = folder / "run.json"
+def _plain(training: Training) -> dict[str, Any]:
+    """A training as JSON holds it.
+
+    Raises:
+        TrainingError: for values that JSON cannot write.
+    """
+    try:
+        return json.loads(json.dumps(dataclasses.asdict(training)))
+    except (TypeError, ValueError) as error:
+        raise TrainingError("training", training, f"values that JSON can write ({error})") from error
+
+
+def _refuse_others(folder: Path, configuration: dict[str, Any], free: set[str]) -> None:
+    """See that a folder holds no run but this one; what `free` names may change, as may steps, options and patience."""
+    file = folder / RECORD
     if not file.exists():
-        folder.mkdir(parents=True, exist_ok=True)
-        file.write_text(json.dumps({"configuration": configuration, "versions": versions()}, indent=1))
         return
     with reading("run", file, "a file that `train` wrote", TrainingError):
         before = dict(json.loads(file.read_text(encoding="utf-8"))["configuration"])
     for name, value in configuration.items():
         if name not in {"steps", "options", "patience", *free} and before.get(name) != value:
             raise TrainingError(f"{name} of the run in {folder}", value, f"{before.get(name)!r}, or another folder")
+
+
+def _claim(folder: Path, configuration: dict[str, Any]) -> None:
+    """Make a folder this run's, if it is not yet."""
+    if not (folder / RECORD).exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        text = json.dumps({"configuration": configuration, "versions": versions()}, indent=1)
+        write_atomically(folder / RECORD, lambda file: file.write(text.encode()))
 
 
 def versions() -> dict[str, str]:
@@ -214,8 +277,9 @@ def _installed(name: str) -> bool:
     return True
 
 
-def _write_rows(file: Path, rows: list[dict[str, Any]]) -> None:
-    with file.open("w", newline="") as stream:
-        writer = csv.DictWriter(stream, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
+def _write_rows(path: Path, rows: list[dict[str, Any]]) -> None:
+    text = io.StringIO(newline="")
+    writer = csv.DictWriter(text, list(rows[0]))
+    writer.writeheader()
+    writer.writerows(rows)
+    write_atomically(path, lambda file: file.write(text.getvalue().encode()))

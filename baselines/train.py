@@ -18,9 +18,12 @@ from stable_baselines3.common.logger import configure
 from stable_baselines3.common.utils import set_random_seed
 from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv, VecMonitor, VecNormalize
 
+from artde_gym.errors import WorkerError
 from artde_gym.evaluation.lock import writes_folder
+from artde_gym.evaluation.workers import GUARD, ignored_interrupt
 from artde_gym.layout import Layout
 from baselines.checkpoint import Checkpoints
+from baselines.errors import TrainingError
 from baselines.export import exported
 from baselines.recipe import Recipe
 from baselines.residual import Residual
@@ -44,12 +47,15 @@ def train(training: Training, out: str | Path, on_progress: Callable[[Progress],
     a held-out test) and `policy/`, the best policy by the test's score.
 
     Raises:
-        TrainingError: if `out` holds a run of another configuration.
+        TrainingError: if `out` holds a run of another configuration, or for options that do not go together.
+        OptionError, DisturbanceError, UnknownNameError, GainError: for a bad argument; nothing has been written then.
     """
     run = Run(training, Path(out), on_progress)
     env, residual = environments(training, run)
     try:
-        Trainer(run, env, residual).go()
+        trainer = Trainer(run, env, residual)
+        run.begin(residual)
+        trainer.go()
     finally:
         env.close()
     return run.exported
@@ -63,8 +69,10 @@ class Trainer:
         training, task = run.training, run.task
         options = {**(task.ppo if training.algo == "ppo" else task.sac), **training.options}
         self.env = VecNormalize(VecMonitor(env), gamma=options["gamma"])
-        self.model = _model(training, self.env, options, residual.features)
-        self.model.set_logger(configure(str(run.folder / "tensorboard"), ["tensorboard"]))
+        try:
+            self.model = _model(training, self.env, options, residual.features)
+        except (AssertionError, TypeError, ValueError, MemoryError) as error:  # Stable-Baselines3's own checks
+            raise TrainingError("options", options, f"arguments that go together ({error})") from error
         self.interval = SAC_INTERVAL
         if training.algo == "ppo":
             self.interval = task.rollouts * options["n_steps"] * env.num_envs
@@ -76,6 +84,7 @@ class Trainer:
 
     def go(self) -> None:
         run, training = self.run, self.run.training
+        self.model.set_logger(configure(str(run.folder / "tensorboard"), ["tensorboard"]))
         self._report(self.steps)
         while self.steps < training.steps and run.state["stale"] < training.patience:
             self.learn()
@@ -147,7 +156,17 @@ def environments(training: Training, run: Run) -> tuple[VecEnv, Residual]:
         functools.partial(_worker_env, training.env_id, kwargs, training.recipe) for _ in range(count)
     ]
     residual = single(training.env_id, kwargs, training.recipe).residual
-    return (DummyVecEnv(makers) if training.workers == 1 else SubprocVecEnv(makers, start_method="spawn")), residual
+    return (DummyVecEnv(makers) if training.workers == 1 else _processes(makers)), residual
+
+
+def _processes(makers: list[Callable[[], gym.Env[Any, Any]]]) -> VecEnv:
+    """Environments in processes of their own."""
+    try:
+        with ignored_interrupt():
+            return SubprocVecEnv(makers, start_method="spawn")
+    except (EOFError, ConnectionError) as error:  # it does not say what its processes ended with
+        allowed = f"workers that live: if memory is short, take fewer of them; they need {GUARD}"
+        raise WorkerError("worker processes", "ended when they had just started", allowed) from error
 
 
 def _worker_env(env_id: str, kwargs: dict[str, Any], recipe: Recipe) -> ResidualEnv:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from artde_gym.arguments import reading
 from artde_gym.evaluation.lock import writes_folder
+from artde_gym.evaluation.store import write_atomically
 from baselines.balance import GAINS, balance_network
 from baselines.errors import TrainingError
 from baselines.network import Network
@@ -54,6 +55,7 @@ def tune(training: Training, out: str | Path, on_progress: Callable[[Progress], 
             told = [{"costs": [float(cost) for cost in one["costs"]], "steps": int(one["steps"])}
                     for one in stored["generations"]]  # fmt: skip
             run.state |= {name: stored["state"][name] for name in run.state}
+    run.begin(residual)
     strategy = CMA(np.zeros(GAINS), SPREAD, population_size=POPULATION, seed=training.seed)
     steps, generation = 0, 0
     while steps < training.steps and not strategy.should_stop():
@@ -73,9 +75,8 @@ def tune(training: Training, out: str | Path, on_progress: Callable[[Progress], 
             if generation % training.test_every == 0:
                 network = balance_network(_mean(strategy), residual.features, residual.actions)
                 run.test(network, residual, steps, {"mean_cost": float(np.mean(costs))})
-            part = file.with_suffix(".part")
-            part.write_text(json.dumps({"state": run.state, "generations": told}))
-            part.replace(file)
+            text = json.dumps({"state": run.state, "generations": told})
+            write_atomically(file, lambda stream, text=text: stream.write(text.encode()))
             run.report(steps, f"generation {generation}, mean cost {np.mean(costs):.3f}")
     env.close()
     return run.exported

@@ -20,6 +20,7 @@ import yaml
 WEIRD: list[Any] = [
     None, True, -1, 0, 3, 10**30, 1e308, float("nan"), float("inf"), "", "x", "../../outside", "/outside", "a\x00b",
     "<script>alert(1)</script>", [], [[]], [1, "a"], {}, {"": {}}, {"a": [None]}, "S2", "tde", "artde", "-" * 1000,
+    "no", [54], 1e9, 0.5,
 ]  # fmt: skip
 
 

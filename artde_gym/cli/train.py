@@ -61,13 +61,18 @@ def train(
             raise
         raise OptionError("algo", algo, "what is installed; pip install 'artde-gym[rl]'") from error
     columns = (TextColumn("decisions"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, TextColumn("{task.description}")) as bar:
-        shown = bar.add_task("", total=steps)
+    bar = Progress(*columns, TextColumn("{task.description}"))
+    shown = bar.add_task("", total=steps)
 
-        def on_progress(news: TrainingProgress) -> None:
-            bar.update(shown, completed=news.steps, total=news.wanted, description=news.text)
+    def on_progress(news: TrainingProgress) -> None:
+        bar.start()  # with the first news; an error before it leaves no empty bar
+        bar.update(shown, completed=news.steps, total=news.wanted, description=news.text)
 
+    try:
         policy = go(training, out, on_progress)
+    finally:
+        if bar.live.is_started:
+            bar.stop()
     print(f"best policy: {policy}")
     if report:
         show_report(out, Console())

@@ -25,7 +25,7 @@ from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.rollout import Episode, Policy, run_episode
 from artde_gym.evaluation.seeds import episode_seed, with_exact_seeds
 from artde_gym.evaluation.store import Store
-from artde_gym.evaluation.workers import run_here, run_parallel
+from artde_gym.evaluation.workers import check_workers, run_here, run_parallel
 from artde_gym.registration import ControllerSpec, make_controller, register_spec, registered_controllers
 from artde_gym.scenarios import Scenario
 from artde_gym.scenarios import scenario as find_scenario
@@ -122,8 +122,7 @@ def evaluate(
     """
     if not (isinstance(episodes, int) and episodes >= 1):
         raise OptionError("episodes", episodes, "a whole number >= 1")
-    if not (isinstance(workers, int) and workers >= 1):
-        raise OptionError("workers", workers, "a whole number >= 1")
+    check_workers(workers)
     if not (isinstance(seed, int) and seed >= 0):
         raise OptionError("seed", seed, "a whole number >= 0")
     if not trace_hz > 0:

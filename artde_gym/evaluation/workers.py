@@ -9,19 +9,28 @@ import itertools
 import multiprocessing
 import os
 import signal
+import sys
 import threading
+import time
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import connection
+from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any
 
-from artde_gym.errors import WorkerError
+from artde_gym.errors import OptionError, WorkerError
 
 AHEAD = 2
 """Jobs a worker that are handed out at once: no worker waits for its next one, and a million of them do not pile up."""
 PATIENCE = 0.2  # s between two looks at the progress
+GRACE = 5.0
+"""Time (s) that workers have to stop by themselves after an interruption; a second one ends them at once."""
+UNGUARDED = 79
+"""Exit code of a worker that would have started workers of its own, since its script starts them when imported."""
 DEATHS = 3
 """How often in a row a worker may end, without a finished job in between, before the jobs are believed to kill it."""
+GUARD = "a script that starts nothing when it is imported: put the call below `if __name__ == '__main__':`"
 
 Job = Any
 Work = Callable[[Job, Callable[[float], None]], Any]
@@ -41,8 +50,9 @@ def run_parallel(work: Work, jobs: Iterable[Job], workers: int, on_time: OnTime)
     """Do the jobs on so many processes; what a worker was at when it was killed is done again.
 
     Raises:
-        WorkerError: if workers keep ending before any job is done.
+        WorkerError: if workers keep ending before any job is done, or if the script that calls this has no main guard.
     """
+    check_workers(workers)
     numbered, held = enumerate(jobs), dict[int, Job]()
     deaths = 0
     while deaths < DEATHS:
@@ -66,7 +76,8 @@ def _run_until_a_death(
     Raises:
         BrokenProcessPool: when a worker was killed.
     """
-    context = multiprocessing.get_context("spawn")  # a fork would copy physics clients and locks
+    crew = _Crew()
+    context = crew.context
     channel, stop = context.Queue(), context.RawValue(ctypes.c_bool, False)  # no lock that could die with its holder
     pool = ProcessPoolExecutor(workers, context, _start_worker, (channel, stop))
     running: dict[Future[Any], int] = {}
@@ -81,9 +92,7 @@ def _run_until_a_death(
 
     with _one_thread_each():
         try:
-            with (
-                _ignored_interrupt()
-            ):  # what a new process inherits: Ctrl-C goes to the whole group, the parent decides
+            with ignored_interrupt():
                 hand_out([*held, *more()])
             while running:
                 finished, _ = wait(running, timeout=PATIENCE, return_when=FIRST_COMPLETED)
@@ -95,10 +104,57 @@ def _run_until_a_death(
                     result, number = future.result(), running.pop(future)
                     yield held.pop(number), result
                 hand_out(more())
+        except BrokenProcessPool:
+            pool.shutdown(wait=True, cancel_futures=True)
+            if any(worker.exitcode == UNGUARDED for worker in crew.workers):
+                raise WorkerError("worker processes", "each started the script again", GUARD) from None
+            raise
         finally:
             stop.value = True
-            pool.shutdown(wait=True, cancel_futures=True)
+            pool.shutdown(wait=False, cancel_futures=True)
+            crew.end()
             channel.close()
+
+
+class _Crew:
+    """Processes that `context` starts as `spawn` does, since a fork would copy physics clients and locks."""
+
+    def __init__(self) -> None:
+        self.context: Any = SpawnContext()
+        self.context.Process = self._process
+        self.workers: list[SpawnProcess] = []
+
+    def _process(self, *args: Any, **kwargs: Any) -> SpawnProcess:
+        self.workers.append(SpawnProcess(*args, **kwargs))
+        return self.workers[-1]
+
+    def end(self) -> None:
+        """Wait until all workers have ended; kill what is still there after a while, or at once when interrupted."""
+        running = {worker.sentinel: worker for worker in self.workers if worker.pid is not None}
+        deadline = time.monotonic() + GRACE
+        with contextlib.suppress(KeyboardInterrupt):
+            while running and (left := deadline - time.monotonic()) > 0:
+                ended: list[Any] = connection.wait(list(running), left)
+                for sentinel in ended:
+                    del running[sentinel]
+        with ignored_interrupt():  # there is nothing more to wait for
+            for worker in running.values():
+                worker.kill()
+                worker.join()
+
+
+def check_workers(workers: Any) -> None:
+    """Check a number of workers before anything is written.
+
+    A worker that gets here while it imports its parent's script, which has no main guard, ends at once.
+
+    Raises:
+        OptionError: unless it is a whole number >= 1.
+    """
+    if not (isinstance(workers, int) and workers >= 1):
+        raise OptionError("workers", workers, "a whole number >= 1")
+    if getattr(multiprocessing.current_process(), "_inheriting", False):  # as multiprocessing itself asks
+        sys.exit(UNGUARDED)
 
 
 @contextlib.contextmanager
@@ -116,7 +172,8 @@ def _one_thread_each() -> Generator[None, None, None]:
 
 
 @contextlib.contextmanager
-def _ignored_interrupt() -> Generator[None, None, None]:
+def ignored_interrupt() -> Generator[None, None, None]:
+    """Ctrl-C is ignored, here and by processes that are started meanwhile: it goes to all, and the parent decides."""
     if threading.current_thread() is not threading.main_thread():
         yield  # only the main thread may set handlers, and only it is interrupted
         return

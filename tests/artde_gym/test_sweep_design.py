@@ -171,6 +171,30 @@ def test_numbers_may_be_written_as_yaml_1_2_does(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1:30", "1:30"), ("1:30.5", "1:30.5"), ("010", 10), ("-010", -10), ("0o10", 8), ("0x1F", 31), ("0b11", "0b11"),
+        ("1_000", "1_000"), ("yes", "yes"), ("No", "No"), ("on", "on"), ("OFF", "OFF"), ("y", "y"), ("true", True),
+        ("False", False), ("tRUE", "tRUE"), ("~", None), ("", None), ("NULL", None), ("2020-01-01", "2020-01-01"),
+        ("1.", 1.0), (".5", 0.5), ("+3", 3), ("1e3", 1000.0), ("-.INF", float("-inf")), ("=", "="), ("'1'", "1"),
+        ("1.5.2", "1.5.2"), ("0o8", "0o8"), ("e3", "e3"), (".", "."), ("-", [None]),
+    ],
+)  # fmt: skip
+def test_values_are_those_of_yaml_1_2(tmp_path, text, value):
+    found = read(file(tmp_path, f"a:\n  {text}"))["a"]
+    assert (found, type(found)) == (value, type(value))
+
+
+def test_keys_are_words_as_they_stand(tmp_path):
+    assert read(file(tmp_path, "on: 1\nyes: 2\n<<: 3")) == {"on": 1, "yes": 2, "<<": 3}
+
+
+def test_a_file_without_an_end_is_not_read_to_it():
+    with pytest.raises(OptionError, match="bytes"):
+        read("/dev/zero")
+
+
+@pytest.mark.parametrize(
     ("text", "words"),
     [
         ("controller: !!python/object/apply:os.system ['touch owned']", "python/object"),
@@ -182,7 +206,8 @@ def test_numbers_may_be_written_as_yaml_1_2_does(tmp_path):
         ("a: [", "readable YAML"),
         (b"\xff\xfe\x00", "readable YAML"),
         ("[" * 5000, "readable YAML"),
-        ("a: 0001-99-99", "readable YAML"),
+        ("a: !!timestamp 0001-99-99", "readable YAML"),
+        ("a: !!int 1:30", "readable YAML"),
         ("#" * (1 << 21), "bytes"),
     ],
 )

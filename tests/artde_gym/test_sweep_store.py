@@ -272,6 +272,49 @@ def test_other_software_is_refused(tmp_path, whole, monkeypatch):
     pd.testing.assert_frame_equal(read_sweep(tmp_path / "whole"), whole, check_exact=True)
 
 
+TOGETHER = """
+import os, sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+import test_sweep_store as tests
+from artde_gym.errors import StoreError
+from artde_gym.evaluation.lock import locked
+
+for number in range(10):
+    (begin, start), (report, answer) = os.pipe(), os.pipe()
+    folder = Path(sys.argv[2]) / str(number)
+    for child in range(3):
+        if os.fork() == 0:
+            os.close(start)
+            try:
+                with locked(folder), tests.SweepStore(folder) as store:
+                    os.read(begin, 1)  # until the others have been refused
+                    store.begin("{}", {})
+                    store.add(tests.FIRST)
+            except StoreError as error:
+                os.write(answer, f"{error}\\n".encode())
+            os._exit(0)
+    os.close(begin), os.close(answer)
+    refused = ""
+    while refused.count("\\n") < 2:
+        refused += os.read(report, 10_000).decode()
+    os.close(start)
+    for child in range(3):
+        os.wait()
+    print(refused, end="")
+    assert len(tests.read_sweep(folder)) == 2
+"""
+
+
+def test_of_sweeps_that_begin_together_one_runs_and_the_others_say_so(tmp_path):
+    arguments = [sys.executable, "-c", TOGETHER, str(Path(__file__).parent), str(tmp_path)]
+    outcome = subprocess.run(arguments, capture_output=True, text=True, timeout=100, check=False)
+    assert outcome.returncode == 0, outcome.stderr
+    lines = outcome.stdout.splitlines()
+    assert len(lines) == 20
+    assert all("a folder that nobody else writes; process" in line for line in lines)
+
+
 def test_every_run_leaves_its_provenance(tmp_path, whole):
     stored(tmp_path / "whole", [row(9)])
     record = json.loads((tmp_path / "whole" / "sweep.json").read_text())

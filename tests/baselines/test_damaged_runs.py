@@ -12,6 +12,7 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import baselines
@@ -75,6 +76,54 @@ def test_a_recipe_cannot_lead_elsewhere(recipe: dict[str, Any], tmp_path: Path) 
     content["recipe"] |= recipe
     (folder / DESCRIPTION).write_text(json.dumps(content))
     with pytest.raises(REFUSED):
+        baselines.load(folder)
+
+
+FIELDS: list[tuple[str, Any]] = [
+    ("version", True), ("version", 1.0), ("name", 3), ("name", "../../outside"), ("recipe", []),
+    ("recipe: hold", 1e9), ("recipe: hold", "0.015"), ("recipe: hold", False), ("recipe: hold", None),
+    ("recipe: limit", float("nan")), ("recipe: limit", -1), ("recipe: gated", "no"), ("recipe: channel", "x"),
+    ("recipe: channel", 0), ("recipe: base", None), ("recipe: gains", []), ("recipe: robot", ["q450"]),
+    ("recipe: unknown", 1), ("network", 3), ("network: sizes", [54]), ("network: sizes", []),
+    ("network: sizes", [54, 0, 3]), ("network: sizes", [54.0, 64, 64, 3]), ("network: sizes", {"54": 3}),
+    ("network: squashed", "no"), ("network: squashed", 1), ("network: squashed", None), ("network: activation", "relu"),
+    ("features_sha256", None), ("actions", "xyz"), ("actions", [1, 2, 3]), ("control_period", float("nan")),
+    ("control_period", 0), ("control_period", -0.005), ("control_period", "0.005"), ("control_period", 1e9),
+    ("control_period", True), ("nominal_robot", ["q450"]), ("about", []), ("weights_sha256", 0),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("field", "value"), FIELDS, ids=str)
+def test_every_field_of_a_policy_is_checked(field: str, value: Any, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(SHIPPED / "quadrotor-gale", tmp_path / "policy"))
+    content = json.loads((folder / DESCRIPTION).read_text())
+    outer, _, inner = field.partition(": ")
+    (content[outer] if inner else content)[inner or outer] = value
+    (folder / DESCRIPTION).write_text(json.dumps(content))
+    with pytest.raises(PolicyFileError) as caught:
+        baselines.load(folder)
+    assert (inner or outer).partition("_")[0] in str(caught.value)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_every_field_of_a_policy_is_needed(tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(SHIPPED / "quadrotor-gale", tmp_path / "policy"))
+    content = json.loads((folder / DESCRIPTION).read_text())
+    for name in content.keys() - {"artde_gym"}:  # for the reader of the file alone
+        rest = {key: value for key, value in content.items() if key != name}
+        (folder / DESCRIPTION).write_text(json.dumps(rest))
+        with pytest.raises(PolicyFileError, match=name.partition("_")[0]):
+            baselines.load(folder)
+
+
+def test_a_variance_below_zero_is_refused(tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(SHIPPED / "quadrotor-gale", tmp_path / "policy"))
+    with np.load(folder / WEIGHTS) as stored:
+        arrays: dict[str, Any] = {name: stored[name] for name in stored.files}
+    arrays["variance"][3] = -1.0
+    np.savez(folder / WEIGHTS, **arrays)
+    _right_hash(folder)
+    with pytest.raises(PolicyFileError, match=r"variance is -1\.0"):
         baselines.load(folder)
 
 

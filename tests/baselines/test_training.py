@@ -115,7 +115,7 @@ def test_a_killed_training_continues_from_its_last_checkpoint(tmp_path):
 
 
 def test_a_folder_belongs_to_one_configuration(tmp_path, quick):
-    Run(small(), tmp_path)
+    train(small(steps=1), tmp_path)
     Run(small(steps=7, patience=3, workers=2), tmp_path)  # the same episodes, wherever and however long
     with pytest.raises(TrainingError, match="seed of the run in"):
         Run(small(seed=4), tmp_path)

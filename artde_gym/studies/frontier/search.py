@@ -41,6 +41,7 @@ from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.provenance import MIXED, continued, provenance
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.evaluation.store import claim, plain_configuration, write_atomically
+from artde_gym.evaluation.workers import check_workers
 from artde_gym.kit import Harder
 from artde_gym.studies.frontier.axis import Axis, axis
 from artde_gym.studies.frontier.result import RECORD, Frontier
@@ -105,6 +106,7 @@ def frontier(
         UnknownNameError, OptionError, DisturbanceError, GainError: for a bad argument, before the first episode.
         StoreError: if `out` holds other results, or results of other software, or is written by another process.
     """
+    check_workers(workers)
     if not (isinstance(survival, (int, float)) and 0 < survival <= 1):
         raise OptionError("survival", survival, "above 0 up to 1")
     named = labelled(controllers)

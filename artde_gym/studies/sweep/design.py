@@ -21,13 +21,11 @@ or more paths, leave it as it was, and every combination of the grid meets the s
 
 from __future__ import annotations
 
-import collections
 import dataclasses
 import hashlib
 import itertools
 import json
 import math
-import re
 import sys
 import zlib
 from collections.abc import Mapping
@@ -107,35 +105,21 @@ class Design:
 
 
 def read(path: str | Path) -> dict[str, Any]:
-    """A sweep file as plain values; nothing in it is ever run.
+    """A sweep file as plain values, those of YAML 1.2; nothing in it is ever run.
 
     Raises:
         OptionError: if it cannot be read, or is no YAML mapping of plain values.
     """
     try:
         import yaml
+
+        from artde_gym.studies.sweep.yaml12 import Loader
     except ImportError as error:
         raise OptionError("pyyaml", "not installed", "pip install 'artde-gym[sweep]'") from error
 
-    class Loader(yaml.SafeLoader):
-        """Safe, and without what makes a small file a large one (aliases) or loses values (a key given twice)."""
-
-        def compose_node(self, parent: Any, index: Any) -> Any:
-            if self.check_event(yaml.AliasEvent):
-                raise yaml.YAMLError("an alias (*name), which sweep files do without")
-            return super().compose_node(parent, index)
-
-        def construct_mapping(self, node: Any, deep: bool = False) -> Any:
-            keys = [(key.tag, key.value) for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
-            for (_, key), count in collections.Counter(keys).items():
-                if count > 1:
-                    raise yaml.YAMLError(f"the key {key!r} {count} times")
-            return super().construct_mapping(node, deep)
-
-    number = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+$")  # YAML 1.1 takes 1e-3 for a word
-    Loader.add_implicit_resolver("tag:yaml.org,2002:float", number, list("-+.0123456789"))
     try:
-        data = Path(path).read_bytes()
+        with Path(path).open("rb") as file:
+            data = file.read(LARGEST + 1)
         if len(data) > LARGEST:
             raise OptionError("sweep file", str(path), f"at most {LARGEST} bytes")
         found = yaml.load(data.decode("utf-8"), Loader)

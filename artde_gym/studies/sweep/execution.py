@@ -31,10 +31,10 @@ from artde_gym.evaluation.identity import behind
 from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.rollout import Episode
 from artde_gym.evaluation.seeds import episode_seed
-from artde_gym.evaluation.workers import Runs, run_here, run_parallel
+from artde_gym.evaluation.workers import Runs, check_workers, run_here, run_parallel
 from artde_gym.studies.sweep import parquet
 from artde_gym.studies.sweep.design import Design, Point, design, read
-from artde_gym.studies.sweep.ray_workers import run_on_ray
+from artde_gym.studies.sweep.ray_workers import check_address, run_on_ray
 from artde_gym.studies.sweep.store import Key, SweepStore, read_sweep
 
 Executor = Literal["local", "ray"]
@@ -94,14 +94,15 @@ def sweep(
         StoreError: if `out` holds anything else, is used by another process, or cannot be written (a full disk).
         WorkerError: if workers keep ending before their episodes do.
     """
-    if not (isinstance(workers, int) and workers >= 1):
-        raise OptionError("workers", workers, "a whole number >= 1")
+    check_workers(workers)
     if executor not in get_args(Executor):
         allowed = f"{among(executor, get_args(Executor))}; a physics engine is an argument of environments (env_kwargs)"
         raise OptionError("executor", executor, allowed)
     if address is not None and executor != "ray":
         raise OptionError("address", address, "none without executor 'ray'")
     parquet.pyarrow()
+    if address is not None:
+        check_address(address)
     plan = design(read(given) if isinstance(given, (str, Path)) else given)
     if workers > 1 or executor == "ray":
         check_picklable({point.controller: point.spec for point in plan.points}, {})

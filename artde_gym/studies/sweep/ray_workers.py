@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import itertools
 import os
+import socket
+import subprocess
+import sys
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -11,6 +14,11 @@ from artde_gym.errors import OptionError, WorkerError
 from artde_gym.evaluation.provenance import software
 from artde_gym.evaluation.workers import AHEAD, PATIENCE, Job, Runs, Work
 
+ANSWER = 4.0  # s until a cluster has answered
+JOINED = 14.0  # s until a process has joined it
+JOIN = "import ray, sys; ray.init(sys.argv[1], log_to_driver=False, logging_level='ERROR')"
+SETTINGS = b"\x04"  # type of the first frame of a gRPC server, as of any that speaks HTTP/2
+HELLO = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + b"\0\0\0" + SETTINGS + b"\0" * 5
 RETRIES = 3  # of a job whose worker or node is lost
 STORE = 80 * 2**20  # bytes of shared memory for a cluster on this machine: results are a few kB
 
@@ -74,6 +82,50 @@ def _connect(ray: Any, address: str | None, workers: int) -> None:
         if address is None:
             raise WorkerError("Ray", reason, "a machine on which it starts, within 30 s") from error
         raise OptionError("address", address, f"that of a running Ray cluster ({reason})") from error
+
+
+def check_address(address: str) -> None:
+    """See that there is a cluster at an address; Ray itself takes minutes to find that there is none.
+
+    Raises:
+        OptionError: without Ray, or if a process cannot join one within 20 s.
+    """
+    ray = _ray()
+    if ray.is_initialized():
+        return
+    where = os.environ.get("RAY_ADDRESS", address) if address == "auto" else address
+    host, _, port = where.removeprefix("ray://").rpartition(":")
+    if not (host and port.isdigit()):
+        return  # Ray looks for it itself
+    hosts = [host.strip("[]")]
+    if host in ("localhost", "127.0.0.1"):
+        hosts.append(ray.util.get_node_ip_address())  # Ray listens there, and takes the other name for it
+    reasons = [_silence(one, int(port)) for one in hosts]
+    reason = _refusal(address) if "" in reasons else reasons[-1]
+    if reason:
+        raise OptionError("address", address, f"that of a running Ray cluster, which answers within 20 s ({reason})")
+
+
+def _refusal(address: str) -> str:
+    """Why a process cannot join a cluster in time, in words; empty if one can."""
+    command = [sys.executable, "-c", JOIN, address]
+    try:
+        outcome = subprocess.run(command, capture_output=True, text=True, timeout=JOINED, check=False)
+    except subprocess.TimeoutExpired:
+        return "it does not let a process join"
+    return "" if outcome.returncode == 0 else (outcome.stderr.strip().splitlines() or ["no reason given"])[-1]
+
+
+def _silence(host: str, port: int) -> str:
+    """Why there is no gRPC server, in words; empty if there is one."""
+    try:
+        with socket.create_connection((host, port), timeout=ANSWER) as connection:
+            connection.sendall(HELLO)
+            answer = connection.recv(64)
+    except (OSError, OverflowError, UnicodeError) as error:
+        return str(error)
+    encrypted = os.environ.get("RAY_USE_TLS", "0") not in ("", "0")
+    return "" if encrypted or answer[3:4] == SETTINGS else "it is something else"
 
 
 def _cores(ray: Any) -> int:

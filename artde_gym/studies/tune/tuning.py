@@ -37,6 +37,7 @@ from artde_gym.evaluation.lock import is_empty, writes_folder
 from artde_gym.evaluation.provenance import MIXED, continued, provenance
 from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.store import claim, plain_configuration, write_atomically
+from artde_gym.evaluation.workers import check_workers
 from artde_gym.registration import GainRange, registered_controllers, search_space
 from artde_gym.scenarios import scenario as find_scenario
 
@@ -107,6 +108,7 @@ def tune(
         UnknownNameError, OptionError, DisturbanceError: for a bad argument, before the first trial.
         StoreError: if `out` holds other results, or results of other software, or is written by another process.
     """
+    check_workers(workers)
     for name, count in (("trials", trials), ("episodes", episodes), ("held_out", held_out)):
         if not (isinstance(count, int) and count >= 1):
             raise OptionError(name, count, "a whole number >= 1")

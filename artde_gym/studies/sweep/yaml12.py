@@ -1,0 +1,52 @@
+"""Sweep files as YAML: plain values as the core schema of YAML 1.2.2 (section 10.3) reads them, and nothing else.
+
+PyYAML's own are those of YAML 1.1, in which 1:30 is 90, 010 is 8, 1e-3 is a word, and so many a word is a truth value
+(yes, no, on, off) or a date. Here all these are what they look like to somebody who knows JSON.
+"""
+
+from __future__ import annotations
+
+import collections
+import re
+from typing import Any
+
+import yaml
+
+_TAG = "tag:yaml.org,2002:"
+_CORE = {
+    "null": r"~|null|Null|NULL|",
+    "bool": r"true|True|TRUE|false|False|FALSE",
+    "int": r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+",
+    "float": r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
+}
+
+
+class Loader(yaml.SafeLoader):
+    """Safe, and without what makes a small file a large one (aliases) or loses values (a key given twice)."""
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        if self.check_event(yaml.AliasEvent):
+            raise yaml.YAMLError("an alias (*name), which sweep files do without")
+        return super().compose_node(parent, index)
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> Any:
+        keys = [(key.tag, key.value) for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
+        for (_, key), count in collections.Counter(keys).items():
+            if count > 1:
+                raise yaml.YAMLError(f"the key {key!r} {count} times")
+        return super().construct_mapping(node, deep)
+
+
+def _whole(loader: Any, node: Any) -> int:
+    text = loader.construct_scalar(node)
+    return int(text, 0) if text.startswith(("0o", "0x")) else int(text)
+
+
+def _real(loader: Any, node: Any) -> float:
+    text = loader.construct_scalar(node).lower()
+    return float(text.replace(".inf", "inf").replace(".nan", "nan"))
+
+
+Loader.yaml_implicit_resolvers = {None: [(_TAG + name, re.compile(rf"(?:{text})\Z")) for name, text in _CORE.items()]}
+Loader.add_constructor(_TAG + "int", _whole)
+Loader.add_constructor(_TAG + "float", _real)
