@@ -15,7 +15,7 @@ from gymnasium.utils.env_checker import check_env
 import artde_gym  # noqa: F401  # registers the environments
 from artde_gym.doctor.outcome import Outcome
 from artde_gym.errors import OptionError
-from artde_gym.evaluation.environments import ours
+from artde_gym.evaluation.environments import ours, vector
 
 IN_SI_UNITS = r".*(symmetric and normalized|recommend using np.float32)"
 """Warnings that are no findings: actions are in Nm and N, and float64, by design; RescaleAction gives [-1, 1]."""
@@ -49,7 +49,7 @@ def batch() -> list[Outcome]:
         if gym.spec(name).vector_entry_point is None:
             continue
         try:
-            both: list[Any] = [gym.make_vec(name, size, "vector_entry_point", duration=3.0) for size in (8, 1)]
+            both: list[Any] = [vector(name, '{"duration": 3.0}', size) for size in (8, 1)]
         except OptionError as error:  # the biped's are MuJoCo's
             outcomes.append(Outcome(name, "missing", f"{error.field} {error.value!r} is not there", error.allowed))
             continue

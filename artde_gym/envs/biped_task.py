@@ -12,6 +12,7 @@ import numpy as np
 from artde_gym.arguments import flag, word
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
+from artde_gym.disturbances.numeric import Words
 from artde_gym.envs.options import steps_per_period
 from artde_gym.layout import Field, Layout
 from artde_gym.references.walking import WalkingPattern, hip_height_above_ankle, walking_pattern
@@ -108,7 +109,7 @@ hip pitch, knee, ankle pitch, ankle roll. Held for one control period; clipped t
 `tau_applied` is what really acted, after saturation: the time-delay estimate needs just that.
 
 ## Reward
-Over a control period L, L times the sum of scale x term; each term is in `info["reward_terms"]`:
+Over a control period L, L times the sum of scale x term; each term is in `info`, as `reward_alive` and so on:
 
 | term | scale | value |
 |---|---|---|
@@ -124,9 +125,9 @@ A walk of 58 s without an error earns a little under 203.
 The robot stands on both feet in the pattern's first pose, at rest, in balance with its payload.
 
 ## End
-*Terminated* when it has fallen: tilt above 35 degrees (`info["fall_reason"] == "tilt"`), base below 0.25 m
-(`"height"`), or joint speeds whose norm passes 200 rad/s (`"speed"`: it has diverged). *Truncated* at the end of the
-walk.
+*Terminated* when it has fallen: tilt above 35 degrees (`info["fell_tilt"]`), base below 0.25 m
+(`fell_height`), or joint speeds whose norm passes 200 rad/s (`fell_speed`: it has diverged). *Truncated* at the end of
+the walk.
 
 ## Arguments
 | name | default | allowed | meaning |
@@ -213,10 +214,14 @@ class Walk:
         """The control period with which the walk ends."""
         return len(self.plan) - 1
 
+    @property
+    def words(self) -> Words:
+        """Names of sites and joints."""
+        return {"site": tuple(name for name, _, _ in self.robot.sites), "joint": self.nominal_robot.actuated}
+
     def parse(self, disturbances: Mapping[str, Any]) -> Disturbances:
         """Read disturbances of this robot."""
-        sites = [name for name, _, _ in self.robot.sites]
-        return Disturbances.parse(disturbances, sites, self.nominal_robot.actuated, self.nominal_robot.name)
+        return Disturbances.parse(disturbances, self.words["site"], self.words["joint"], self.nominal_robot.name)
 
     def set_up(self, world: World, realised: Mapping[str, Any]) -> None:
         """Give a world what was drawn for it, the payload excepted."""

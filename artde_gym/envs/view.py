@@ -96,7 +96,7 @@ class View:
             head = f"{self.caption}   t = {time_s:.2f} s" if self.caption else f"t = {time_s:.2f} s"
             _write(drawn, [head, words] if words else [head])
             self._last = key, np.array(drawn)
-        return self._last[1]
+        return self._last[1].copy()
 
     def following(self, home: Vector) -> Camera:
         """Where the camera is now."""

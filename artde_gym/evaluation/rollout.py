@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artde_gym.evaluation.metrics import Metrics, Span, events_of
+from artde_gym.info import fall_reason
 
 Array = NDArray[Any]
 
@@ -58,7 +59,7 @@ def run_episode(
     looks = diagnosed_every(plant, stride)
 
     observation, info = env.reset(seed=seed, options=options)
-    disturbances = info["disturbances"]
+    disturbances = plant.sampled_disturbances
     observations, diagnostics, told = [observation], [], [_told(plant, info)]
     state, episode_start = None, True
     terminated = truncated = False
@@ -83,7 +84,7 @@ def run_episode(
     last = len(observations) - 1
     metrics.add(0, _part(fields, np.s_[:last, None]), _part(inside, np.s_[:, None]))
     metrics.add(last, _part(fields, np.s_[last:, None]), None)  # nothing was decided there any more
-    reason = info.get("fall_reason", "") if terminated else None
+    reason = fall_reason(info) if terminated else None
     row = row_of(reason, info["time_s"], total, metrics.rows()[0], disturbances)
     kept = slice(None, None, stride // looks)
     seen = _part(fields, slice(None, None, stride)) | stack(told)
