@@ -6,7 +6,7 @@ import abc
 import copy
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
 import gymnasium as gym
 import numpy as np
@@ -131,6 +131,9 @@ class BatchEnv(VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
 
     def _end(self, ended: Mask) -> None:
         """Episodes have ended and wait; they are not to move."""
+
+    def __copy__(self) -> Self:
+        return copy.deepcopy(self)  # two of them cannot share their worlds
 
     @property
     def sampled_disturbances(self) -> list[dict[str, Any]]:

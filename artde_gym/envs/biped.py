@@ -24,6 +24,7 @@ from artde_gym.envs.options import disturbances_in
 from artde_gym.envs.view import View
 from artde_gym.errors import OptionError
 from artde_gym.info import REWARD, count_events, flag_reason, prefixed
+from artde_gym.references.walking import WalkingPattern
 from artde_gym.robots import ojas as robot
 from artde_gym.robots.ojas import ActuatorInertia
 from artde_gym.sim.engine import Camera, Engine
@@ -105,7 +106,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         walk = self._walk = task.Walk.of(
             control_period, actuator_inertia, arms, self_collision, speed, step_duration, duration
         )
-        self.nominal_robot, self.pattern, self.control_period = walk.nominal_robot, walk.pattern, walk.control_period
+        self.nominal_robot, self.control_period = walk.nominal_robot, walk.control_period
         self._disturbances = walk.parse(self.default_disturbances if disturbances is None else disturbances)
         self._engine: Engine = make_engine(engine, walk.robot, task.TIME_STEP, renders=render_mode is not None)
         camera = Camera((0.0, 0.0, CAMERA_HEIGHT), width=width, height=height)
@@ -180,6 +181,11 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
     def close(self) -> None:
         self._engine.close()
         self._engine = self.view = CLOSED
+
+    @property
+    def pattern(self) -> WalkingPattern:
+        """What is walked."""
+        return self._walk.pattern
 
     @property
     def elapsed(self) -> int:

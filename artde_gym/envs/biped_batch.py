@@ -117,7 +117,7 @@ class BipedVectorEnv(BatchEnv):
         walk = self._walk = task.Walk.of(
             control_period, actuator_inertia, arms, self_collision, speed, step_duration, duration
         )
-        self.nominal_robot, self.pattern, self.control_period = walk.nominal_robot, walk.pattern, walk.control_period
+        self.nominal_robot, self.control_period = walk.nominal_robot, walk.control_period
         self._last, self.words = min(walk.last, self._limit or walk.last), walk.words
         self._disturbances = self._parse(self.default_disturbances if disturbances is None else disturbances)
         self._batch = make_batch("mujoco", walk.robot, num_envs, task.TIME_STEP, threads)

@@ -157,6 +157,7 @@ class Walk:
         position: of the base at the start (m), the robot standing upright.
         stand: joint torques (12,) (Nm) that balance the pattern's first pose.
         damping: of the joints while the robot settles (Nm s/rad).
+        arguments: of which it was made.
     """
 
     nominal_robot: RobotSpec
@@ -167,6 +168,7 @@ class Walk:
     position: Vector
     stand: Array
     damping: float
+    arguments: tuple[Any, ...]
 
     @classmethod
     def of(
@@ -198,7 +200,14 @@ class Walk:
         stand = Supported(nominal).torque(0.5, pattern.q[0], rest, rest)
         damping = BARE_DAMPING if actuator_inertia == "none" else SETTLE_DAMPING
         place = (float(pattern.base[0, 0]), 0.0, hip_height)
-        return cls(nominal, model, pattern, substeps, plan, place, stand, damping)
+        arguments = (control_period, actuator_inertia, arms, self_collision, speed, step_duration, duration)
+        return cls(nominal, model, pattern, substeps, plan, place, stand, damping, arguments)
+
+    def __deepcopy__(self, _: dict[int, Any]) -> Walk:
+        return self  # nothing of it changes
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Walk.of, self.arguments  # a thousandth of what they make
 
     @property
     def start(self) -> Array:

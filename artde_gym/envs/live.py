@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 import copy
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Self
 
 from artde_gym.disturbances.numeric import Words, numeric
 from artde_gym.disturbances.schedule import Push, Schedule
@@ -23,6 +23,9 @@ class Live(abc.ABC):
     _engine: Engine
     _realised: Mapping[str, Any]
     words: Words
+
+    def __copy__(self) -> Self:
+        return copy.deepcopy(self)  # two of them cannot share a world
 
     @property
     @abc.abstractmethod
