@@ -30,13 +30,18 @@ REWARD, FELL = "reward_", "fell_"  # in front of names
 
 def count_events(events: Sequence[str]) -> dict[str, int]:
     """Count each kind of event."""
-    return {name: events.count(name) for name in EVENTS}
+    counts = dict.fromkeys(EVENTS, 0)
+    for name in events:
+        counts[name] += 1
+    return counts
 
 
 def flag_reason(names: Sequence[str], holds: Sequence[bool]) -> dict[str, bool]:
     """Mark the first reason that holds; none does at the start of an episode, where `holds` is empty."""
-    first = next((name for name, held in zip(names, holds, strict=False) if held), None)
-    return {FELL + name: name == first for name in names}
+    flags = dict.fromkeys([FELL + name for name in names], False)
+    if any(holds):
+        flags[FELL + names[list(holds).index(True)]] = True
+    return flags
 
 
 def fall_reason(info: Mapping[str, Any], robot: int | None = None) -> str:
@@ -59,7 +64,7 @@ def prefixed(prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
 
 def copied(values: Mapping[str, Any]) -> dict[str, Any]:
     """Copy a dictionary and the arrays in it."""
-    return {name: value.copy() if isinstance(value, np.ndarray) else value for name, value in values.items()}
+    return {name: value.copy() if type(value) is np.ndarray else value for name, value in values.items()}
 
 
 def masked(values: Mapping[str, Any], mask: Mask) -> dict[str, Any]:
@@ -99,11 +104,11 @@ class SampledTable:
             column[(row, *map(slice, cell.shape))] = cell
 
     def told(self) -> dict[str, Any]:
-        """All that is known, as new arrays."""
+        """All that is known, as new arrays, for `masked`, which makes new masks."""
         told: dict[str, Any] = {}
         for name, known in self._known.items():
             if known.any():
-                told[name], told[f"_{name}"] = self._columns[name].copy(), known.copy()
+                told[name], told[f"_{name}"] = self._columns[name].copy(), known
         return told
 
     def _fitted(self, column: NDArray[Any] | None, cell: NDArray[Any]) -> NDArray[Any]:

@@ -21,7 +21,8 @@ from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.numeric import Words, numeric
 from artde_gym.disturbances.schedule import EVENTS
 from artde_gym.envs.closed import refuse
-from artde_gym.envs.options import disturbances_in
+from artde_gym.envs.counted import Counted
+from artde_gym.envs.options import disturbances_in, warn_of_idle
 from artde_gym.errors import ActionError, OptionError
 from artde_gym.info import FELL, REWARD, Columns, Mask, SampledTable, cleared, masked, prefixed
 from artde_gym.layout import Layout
@@ -30,7 +31,7 @@ from artde_gym.tracking import Tracking
 Order = Literal["C", "F"]
 
 
-class BatchEnv(VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
+class BatchEnv(Counted, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
     """Many environments in one. Each has a generator of its own, and does the same whatever the number beside it.
 
     A subclass says what happens; observations and actions are (n, size), in its `order` of memory.
@@ -63,7 +64,6 @@ class BatchEnv(VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
     control_period: float
     words: Words
     _disturbances: Disturbances
-    _last: int  # control period with which an episode ends
     _np_random: Any  # a list: one for each environment, as for the seeds
     _np_random_seed: Any
 
@@ -166,6 +166,7 @@ class BatchEnv(VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
         disturbances = disturbances_in(options, self)
         if disturbances is not None:
             self._disturbances = self._parse(disturbances)
+            warn_of_idle(self._disturbances, self._last * self.control_period)
         for i in np.flatnonzero(mask).tolist():
             if seeds[i] is not None:
                 self._np_random[i], self._np_random_seed[i] = seeding.np_random(seeds[i])
@@ -225,7 +226,7 @@ class BatchEnv(VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
             warnings.warn(
                 f"{type(self).__name__} runs in {self.own_engine!r}, gym.make in 'bullet' unless told otherwise, so "
                 f"that results differ; give engine={self.own_engine!r} if this is meant",
-                stacklevel=4,
+                stacklevel=6,  # where gymnasium.make_vec was called
             )
         elif engine != self.own_engine:
             allowed = f"{self.own_engine!r}; for engine {engine!r}: gym.make_vec(..., vectorization_mode='sync')"

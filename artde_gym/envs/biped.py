@@ -20,7 +20,7 @@ from artde_gym.envs.biped_course import Course
 from artde_gym.envs.closed import CLOSED
 from artde_gym.envs.documentation import filled
 from artde_gym.envs.live import Live
-from artde_gym.envs.options import disturbances_in
+from artde_gym.envs.options import disturbances_in, warn_of_idle
 from artde_gym.envs.view import View
 from artde_gym.errors import OptionError
 from artde_gym.info import REWARD, count_events, flag_reason, prefixed
@@ -81,6 +81,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
     action_layout = task.ACTION
     robot_name: ClassVar[str] = "ojas"
     tracking = task.TRACKING
+    fall_reasons: ClassVar[Sequence[str]] = task.FALL_REASONS
 
     @known_arguments
     def __init__(
@@ -121,9 +122,10 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self._engine.place(walk.position, walk.start)
         self._still = self._settle(walk.start, task.SETTLE_STEPS)
         self._settled = self._engine.snapshot()
-        self._k, self._over = 0, True  # no step before the first reset
+        self._k, self._last, self._over = 0, walk.last, True  # no step before the first reset
         self._state, self.words = self._engine.read(), walk.words
         self._sample({})
+        warn_of_idle(self._disturbances, self._last * self.control_period)
         self._course = Course(self._realised, walk, self.np_random)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
@@ -137,6 +139,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         disturbances = disturbances_in(options or {}, self)
         if disturbances is not None:
             self._disturbances = self._walk.parse(disturbances)
+            warn_of_idle(self._disturbances, self._last * self.control_period)
         super().reset(seed=seed_number("seed", seed))
         realised = self._disturbances.draw(self.np_random)
         self._sample(realised)
@@ -164,7 +167,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         terms = self._reward_terms(previous)
         reward = self.control_period * sum(map(operator.mul, task.REWARD_SCALES.values(), terms.values()))
         falls = self._falls()
-        fell, truncated = any(falls), self._k >= self._walk.last
+        fell, truncated = any(falls), self._k >= self._last
         self._over = fell or truncated
         return observation, reward, fell, truncated, self._info(terms, falls, events)
 

@@ -20,6 +20,7 @@ from artde_gym.envs import biped_task as task
 from artde_gym.envs.batch import BatchEnv, Mask
 from artde_gym.envs.biped_course import Course
 from artde_gym.envs.documentation import filled
+from artde_gym.envs.options import warn_of_idle
 from artde_gym.errors import OptionError
 from artde_gym.robots import ojas as robot
 from artde_gym.robots.ojas import ActuatorInertia
@@ -120,6 +121,7 @@ class BipedVectorEnv(BatchEnv):
         self.nominal_robot, self.control_period = walk.nominal_robot, walk.control_period
         self._last, self.words = min(walk.last, self._limit or walk.last), walk.words
         self._disturbances = self._parse(self.default_disturbances if disturbances is None else disturbances)
+        warn_of_idle(self._disturbances, self._last * self.control_period)
         self._batch = make_batch("mujoco", walk.robot, num_envs, task.TIME_STEP, threads)
         self._courses: dict[int, Course] = {}
         self._wakes = np.full(num_envs, NEVER)  # time step of each walk in which its course is to be asked again

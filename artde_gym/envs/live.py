@@ -10,13 +10,14 @@ from typing import Any, Self
 from artde_gym.disturbances.numeric import Words, numeric
 from artde_gym.disturbances.schedule import Push, Schedule
 from artde_gym.envs.closed import CLOSED, refuse
+from artde_gym.envs.counted import Counted
 from artde_gym.errors import RobotError
 from artde_gym.info import copied
 from artde_gym.robots.spec import RobotSpec, Vector
 from artde_gym.sim.engine import Engine
 
 
-class Live(abc.ABC):
+class Live(Counted, abc.ABC):
     """A part of an environment: pushes and drops that nobody planned, and a look at its world."""
 
     nominal_robot: RobotSpec

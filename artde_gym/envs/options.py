@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping
 from typing import Any
 
 from artde_gym.arguments import number
+from artde_gym.disturbances import Disturbances
 from artde_gym.errors import OptionError
 
 
@@ -22,6 +24,12 @@ def steps_per_period(control_period: float, step: float) -> int:
     if not (1 <= steps <= round(0.05 / step) and math.isclose(steps * step, period, rel_tol=1e-9)):
         raise OptionError("control_period", control_period, allowed)
     return steps
+
+
+def warn_of_idle(disturbances: Disturbances, duration: float) -> None:
+    """Warn of disturbances that were asked for and can never happen in an episode of `duration` seconds."""
+    for text in disturbances.idle(duration):
+        warnings.warn(text, stacklevel=5)  # where gymnasium.make was called
 
 
 def disturbances_in(options: Mapping[str, Any], env: Any) -> Mapping[str, Any] | None:

@@ -22,7 +22,7 @@ from artde_gym.envs import quadrotor_task as task
 from artde_gym.envs.closed import CLOSED
 from artde_gym.envs.documentation import filled
 from artde_gym.envs.live import Live
-from artde_gym.envs.options import disturbances_in, steps_per_period
+from artde_gym.envs.options import disturbances_in, steps_per_period, warn_of_idle
 from artde_gym.envs.quadrotor_sensors import Measurement, Sensors
 from artde_gym.envs.view import View
 from artde_gym.errors import OptionError
@@ -85,6 +85,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
     observation_layout = task.OBSERVATION
     robot_name: ClassVar[str] = "q450"
     tracking = task.TRACKING
+    fall_reasons: ClassVar[Sequence[str]] = task.FALL_REASONS
     words = task.WORDS
 
     @known_arguments
@@ -123,6 +124,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self._k, self._over = 0, True  # no step before the first reset
         self._schedule = Schedule({}, TIME_STEP)
         self._sample({})
+        warn_of_idle(self._disturbances, self._last * self.control_period)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
         """Start a flight; `options` are those of the class' documentation.
@@ -135,6 +137,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         disturbances = disturbances_in(options or {}, self)
         if disturbances is not None:
             self._disturbances = task.parse(disturbances)
+            warn_of_idle(self._disturbances, self._last * self.control_period)
         super().reset(seed=seed_number("seed", seed))
         realised = self._disturbances.draw(self.np_random)
         self._sample(realised)

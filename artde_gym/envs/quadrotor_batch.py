@@ -16,7 +16,7 @@ from artde_gym.disturbances.wind import GRID
 from artde_gym.envs import quadrotor_task as task
 from artde_gym.envs.batch import BatchEnv, Mask
 from artde_gym.envs.documentation import filled
-from artde_gym.envs.options import steps_per_period
+from artde_gym.envs.options import steps_per_period, warn_of_idle
 from artde_gym.envs.quadrotor_fleet import Fleet
 from artde_gym.envs.quadrotor_sensors import Measurement, Sensors
 from artde_gym.errors import OptionError
@@ -106,6 +106,7 @@ class QuadInfinityPayloadVectorEnv(BatchEnv):
         self._plan = np.ascontiguousarray(task.plan(duration, self.control_period).T, dtype=self.dtype)
         last = self._plan.shape[1] - 1
         self._last = min(last, self._limit or last)
+        warn_of_idle(self._disturbances, self._last * self.control_period)
         sizes = [min(FLEET, num_envs - first) for first in range(0, num_envs, FLEET)]
         self._fleets = [
             (slice(first, first + size), Fleet(size, steps, self.dtype))

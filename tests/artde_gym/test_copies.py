@@ -65,7 +65,7 @@ def go(env: Any, steps: int) -> list[Any]:
         seen.append((observation.tolist(), np.asarray(reward).tolist(), np.asarray(terminated).tolist(), told))
         if isinstance(env.unwrapped, gym.Env) and (terminated or truncated):
             observation, info = env.reset()
-            seen.append((observation.tolist(), env.unwrapped.sampled_disturbances))
+            seen.append((observation.tolist(), env.get_wrapper_attr("sampled_disturbances")))
     return seen
 
 
