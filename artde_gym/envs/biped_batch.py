@@ -38,7 +38,8 @@ _PAGE = (
 | `render_mode` | None | None | `vectorization_mode="sync"` draws pictures |
 
 `reset(options={{"disturbances": ..., "scenario": "S2"}})` replaces the disturbances of this and the following
-episodes, by a mapping or by those of a named scenario. The option `"reset_mask"` (n,) says where to reset.
+episodes, by a mapping or by those of a named scenario; nothing is merged: what a mapping leaves out does not happen.
+The option `"reset_mask"` (n,) says where to reset.
 
 ## Many at once
 This is for `gym.make_vec(..., vectorization_mode="vector_entry_point")`: each robot does the same to the bit as the one

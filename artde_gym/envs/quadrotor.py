@@ -61,8 +61,13 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
     With `render_mode="rgb_array"`, `render` draws 30 pictures a simulated second; asked more often, it gives the last
     one again. Words of your own in `env.unwrapped.view.caption` are written into each of them.
 
+    Gymnasium's `RecordVideo` takes a picture a step and plays `metadata["render_fps"]` of them a second: up to 100
+    steps a second in real time, and more, at shorter control periods, in slow motion. `artde-gym video` is in real
+    time.
+
     `reset(options={{"disturbances": ..., "scenario": "Q1"}})` replaces the disturbances of this and the following
-    episodes, by a mapping or by those of a named scenario.
+    episodes, by a mapping or by those of a named scenario; nothing is merged, and what a mapping leaves out does not
+    happen.
 
     ## Info
     The same keys after `reset` and after `step`, numbers and arrays alone (`artde_gym.info`): `time_s`; the terms of
