@@ -271,8 +271,9 @@ Values are drawn at each reset from the environment's own seeded generator; `env
 what was drawn, in the same grammar, and `info` the same as numbers (`disturbance.payload.mass`). What `reset` is given
 replaces the disturbances of this and the following episodes; nothing is merged.
 
-Several kinds act together; kinds marked *list* take several entries. Anything outside the grammar, or a kind that the environment's robot does not honour, raises `DisturbanceError` when the environment is made or reset,
-with the key, the value and what is allowed.
+Several kinds act together; kinds marked *list* take several entries. Anything outside the grammar, or a kind that the
+environment's robot does not honour, raises `DisturbanceError` when the environment is made or reset, with the key, the
+value and what is allowed.
 
 """
 
