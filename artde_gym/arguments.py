@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import contextlib
+import functools
+import inspect
 import math
-from collections.abc import Collection, Iterator
+import operator
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Concatenate, Literal, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from artde_gym.errors import ActionError, ArtdeGymError, OptionError
+from artde_gym.errors import ActionError, ArtdeGymError, OptionError, UnknownArgumentError, among
+
+Owner = TypeVar("Owner")
+Arguments = ParamSpec("Arguments")
+
+NUMERIC = "biufO"  # kinds of arrays that hold real numbers; objects are tried one by one
 
 NAME_BYTES = 200
 """Of a name that is a part of a file's: file systems take 255, and a number, an ending and what is added come to it."""
@@ -57,15 +65,69 @@ def action_array(action: Any, size: int, allowed: str) -> NDArray[np.float64]:
     Raises:
         ActionError: for a wrong shape, or a value that is no finite number; `allowed` says what is.
     """
-    try:
-        values = np.asarray(action, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise ActionError("action", action, f"{size} numbers") from error
+    values = real_array("action", action, f"{size} numbers")
     if values.shape != (size,):
         raise ActionError("shape of the action", values.shape, f"({size},)")
     if not all(map(math.isfinite, values.tolist())):  # of few numbers faster than NumPy's
         raise ActionError("action", values.tolist(), f"finite {allowed}")
     return values
+
+
+def real_array(
+    field: str,
+    value: Any,
+    allowed: str,
+    dtype: np.dtype[Any] | type[np.float64] = np.float64,
+    order: Literal["C", "F"] = "C",
+) -> NDArray[Any]:
+    """Copy real numbers of any type into an array.
+
+    Raises:
+        ActionError: for anything else, complex numbers and words of digits included; `allowed` says what is.
+    """
+    try:
+        given = np.asarray(value)
+        if given.dtype.kind not in NUMERIC:
+            raise TypeError(f"values of type {given.dtype}")
+        return np.array(given, dtype=dtype, order=order)
+    except (
+        TypeError,
+        ValueError,
+        OverflowError,
+        RuntimeError,
+    ) as error:  # RuntimeError: a tensor that tracks gradients
+        raise ActionError(field, value, allowed) from error
+
+
+def seed_number(field: str, value: Any) -> int | None:
+    """The value as a seed, if it is a whole number >= 0 of any type, an array of no dimension included, or None.
+
+    Raises:
+        OptionError: if it is not.
+    """
+    try:
+        seed = None if value is None else operator.index(value)
+    except TypeError:
+        seed = -1
+    if isinstance(value, (bool, np.bool_)) or (seed is not None and seed < 0):
+        raise OptionError(field, value, "a whole number >= 0, or None")
+    return seed
+
+
+def known_arguments(
+    initialize: Callable[Concatenate[Owner, Arguments], None],
+) -> Callable[Concatenate[Owner, Arguments], None]:
+    """Decorate an `__init__` so that an unknown keyword raises `UnknownArgumentError` with the one that was meant."""
+    _, *known = inspect.signature(initialize).parameters
+
+    @functools.wraps(initialize)
+    def checked(self: Owner, /, *args: Arguments.args, **kwargs: Arguments.kwargs) -> None:
+        for name in kwargs:
+            if name not in known:
+                raise UnknownArgumentError(type(self).__name__, name, among(name, known))
+        initialize(self, *args, **kwargs)
+
+    return checked
 
 
 def file_name(field: str, value: object) -> str:

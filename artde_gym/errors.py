@@ -25,6 +25,22 @@ class OptionError(ArtdeGymError):
     """An argument of an environment, of `reset(options=...)` or of an evaluation."""
 
 
+class UnknownArgumentError(OptionError, TypeError):
+    """A keyword argument that an environment does not take.
+
+    Also a `TypeError`, as Python raises it, since clients try arguments of other libraries' and look out for that.
+    `gymnasium.make` raises it again with a text of its own, which is then the `field`.
+    """
+
+    def __init__(self, field: str, value: object = None, allowed: str = "") -> None:
+        super().__init__(field, value, allowed)
+
+    def __str__(self) -> str:
+        if not self.allowed:
+            return self.field
+        return f"{self.field} got an unexpected keyword argument {self.value!r}; allowed: {self.allowed}"
+
+
 class ActionError(ArtdeGymError):
     """An action of the wrong shape, or with a value that is not finite."""
 

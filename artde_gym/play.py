@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from artde_gym.evaluation.rollout import Policy
+from artde_gym.info import fall_reason
 from artde_gym.kit import ROBOTS, Push
 from artde_gym.multibody.spec import Vector
 from artde_gym.sim.camera import Camera
@@ -151,7 +152,7 @@ class Session:
             )
             self._observation, _, terminated, truncated, info = self._env.step(action)
             self._first, self.time_s, self.over = False, info["time_s"], terminated or truncated
-            self.fallen = info.get("fall_reason", "")
+            self.fallen = fall_reason(info)
 
     def _show(self) -> None:
         """Each look at the window waits for it: words and the view change less often than the robot moves."""

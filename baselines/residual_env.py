@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 import gymnasium as gym
@@ -9,13 +10,16 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from artde_gym.errors import ActionError
+from artde_gym.arguments import action_array
+from artde_gym.disturbances.schedule import EVENTS
 from baselines.coupling import total
 from baselines.recipe import Recipe
 from baselines.residual import Residual, ResidualMemory
 from controllers.laws.tracking import Array
 
 Float = NDArray[np.float32]
+
+RESIDUAL = "residual_"  # before names of the terms of its reward
 
 
 class ResidualEnv(gym.Wrapper[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]):
@@ -36,8 +40,8 @@ class ResidualEnv(gym.Wrapper[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[
     `Box(-inf, inf, (n,), float32)`; `observation_layout` names its fields. Not normalised: that is for training.
 
     ## Reward
-    The sum of the robot's `reward_scales` times terms, at the end of each decision; terms are in
-    `info["residual_terms"]`.
+    The sum of the robot's `reward_scales` times terms, at the end of each decision; terms are in `info`, each with
+    `residual_` before its name.
 
     Raises:
         OptionError: if the recipe is another robot's, or `hold` is no whole number of control periods.
@@ -57,6 +61,7 @@ class ResidualEnv(gym.Wrapper[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[
         """Start an episode; seed and options are the environment's."""
         self._observation, info = self.env.reset(seed=seed, options=options)
         self._memory = self.residual.start(self._observation)
+        info |= {RESIDUAL + name: 0.0 for name in self.residual.coupling.reward_scales}
         return self._features(), info
 
     def step(self, action: NDArray[Any]) -> tuple[Float, float, bool, bool, dict[str, Any]]:
@@ -68,29 +73,24 @@ class ResidualEnv(gym.Wrapper[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[
         """
         if self._memory is None:
             raise gym.error.ResetNeeded("the episode has not begun: call reset()")
-        action = np.asarray(action, dtype=np.float64)
-        if action.shape != self.action_space.shape:
-            raise ActionError("shape of the action", action.shape, f"{self.action_space.shape}")
-        if not np.isfinite(action).all():
-            raise ActionError("action", action.tolist(), "finite numbers from -1 to 1")
+        action = action_array(action, len(self.actions), "numbers from -1 to 1")
         action = np.minimum(np.maximum(action, -1.0), 1.0)
         memory = self.residual.decide(self._memory, action)
         terminated = truncated = False
         info: dict[str, Any] = {}
-        events: list[str] = []
+        events: Counter[str] = Counter()
         for _ in range(self.residual.periods):
             force, memory = self.residual.control(self._observation, memory)
             self._observation, _, terminated, truncated, info = self.env.step(force)
-            events += info.get("events", ())
+            events.update({name: info[name] for name in EVENTS})
             if terminated or truncated:
                 break
-        if events:
-            info["events"] = events
+        info |= events
         self._memory = memory
         features = self._features()
         coupling = self.residual.coupling
         terms = coupling.reward_terms(self._observation, self._memory.coupling, terminated)
-        info["residual_terms"] = {name: float(value) for name, value in terms.items()}
+        info |= {RESIDUAL + name: float(value) for name, value in terms.items()}
         reward = float(total(coupling.reward_scales, terms))
         return features, reward, bool(terminated), bool(truncated), info
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
+from artde_gym.arguments import real_array
 from artde_gym.errors import ActionError, OptionError
 from baselines.coupling import total
 from baselines.recipe import Recipe
@@ -48,8 +49,8 @@ class ResidualVecEnv(VecEnv):
     def reset(self) -> Float:
         """Start all episodes; seeds and options are those of `seed` and `set_options`."""
         seeds = None if all(seed is None for seed in self._seeds) else self._seeds
-        self._observation, info = self.env.reset(seed=seeds, options=self._options[0] or None)
-        self.reset_infos = [{"disturbances": drawn} for drawn in info["disturbances"]]
+        self._observation, _ = self.env.reset(seed=seeds, options=self._options[0] or None)
+        self.reset_infos = [{"disturbances": drawn} for drawn in self.env.sampled_disturbances]
         self._reset_seeds()
         self._reset_options()
         features, self._memory = self._seen(self._observation, self.residual.start(self._observation))
@@ -63,8 +64,10 @@ class ResidualVecEnv(VecEnv):
         return self._seeds
 
     def step_async(self, actions: NDArray[Any]) -> None:
-        if actions.shape != (self.num_envs, len(self.residual.actions)):
-            raise ActionError("shape of the actions", actions.shape, f"({self.num_envs}, {len(self.residual.actions)})")
+        shape = (self.num_envs, len(self.residual.actions))
+        actions = real_array("actions", actions, f"numbers of the shape {shape}")
+        if actions.shape != shape:
+            raise ActionError("shape of the actions", actions.shape, f"{shape}")
         if not np.isfinite(actions).all():
             raise ActionError("actions", "values that are not finite", "finite numbers from -1 to 1")
         self._action = np.minimum(np.maximum(actions, -1.0), 1.0).astype(self._observation.dtype)

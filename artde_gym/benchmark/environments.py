@@ -23,4 +23,4 @@ def quadrotor(**kwargs: Any) -> Any:
 
 def fleet(size: int, **kwargs: Any) -> Any:
     """Many quadrotors in NumPy."""
-    return gym.make_vec("QuadInfinity-Payload-v0", size, "vector_entry_point", **kwargs)
+    return gym.make_vec("QuadInfinity-Payload-v0", size, "vector_entry_point", engine="numpy", **kwargs)

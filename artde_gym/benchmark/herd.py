@@ -48,4 +48,4 @@ def herds(quick: bool) -> Section:
 
 def herd(size: int, **kwargs: Any) -> Any:
     """So many bipeds on a short walk."""
-    return gym.make_vec("BipedWalk-Payload-v0", size, "vector_entry_point", duration=6.0, **kwargs)
+    return gym.make_vec("BipedWalk-Payload-v0", size, "vector_entry_point", duration=6.0, engine="mujoco", **kwargs)

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from artde_gym.disturbances.kinds import ALL, KINDS, Kind, Parameter, allowed
+from artde_gym.disturbances.kinds import ALL, KINDS, NEVER, Kind, Parameter, allowed
 from artde_gym.errors import DisturbanceError, among
 
 DISTRIBUTIONS = ("uniform", "normal", "choice")
@@ -85,6 +85,13 @@ class Disturbances:
                 realised[name] = values
         return realised
 
+    def idle(self, duration: float) -> list[str]:
+        """Tell which kinds can never happen in an episode of `duration` seconds, and why."""
+        never: dict[str, set[str]] = {}
+        for name, entry in self.entries:
+            never.setdefault(name, set()).add(_idle(entry, duration))
+        return [f"{name} can never happen: {' or '.join(sorted(why))}" for name, why in never.items() if "" not in why]
+
     def to_json(self) -> str:
         """The disturbances as JSON that `parse` reads back."""
         grouped: dict[str, Any] = {}
@@ -94,6 +101,24 @@ class Disturbances:
             else:
                 grouped[name] = dict(entry)
         return json.dumps(grouped)
+
+
+def _idle(entry: Mapping[str, Any], duration: float) -> str:
+    """Say why an entry can never happen; "" if it can."""
+    begin = min(_range(entry.get("start", entry.get("attach", 0.0))))
+    if begin >= duration:
+        return f"begins at {begin:g} s and the episode ends at {duration:g} s"
+    if "drop" in entry and max(_range(entry["drop"])) <= begin:
+        return f"ends at {max(_range(entry['drop'])):g} s and begins at {begin:g} s"
+    return ""
+
+
+def _range(value: Any) -> list[float]:
+    """Numbers between which a checked number or distribution lies."""
+    if not isinstance(value, dict):
+        return [value]
+    ((kind, arguments),) = value.items()
+    return [0.0, NEVER] if kind == "normal" else arguments
 
 
 def _entries(kind: Kind, given: Any) -> list[tuple[str, Any]]:

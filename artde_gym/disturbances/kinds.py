@@ -279,10 +279,13 @@ What happens to a robot beyond its own dynamics, as data: one JSON-able grammar 
 
 In place of any number stands a number or a distribution: `{"uniform": [low, high]}`, `{"normal": [mean, std]}` (drawn
 again until it lies in the allowed range) or `{"choice": [...]}`, whose items are vectors where the parameter is one.
-Values are drawn at each reset from the environment's own seeded generator; `info["disturbances"]` holds what was drawn,
-in the same grammar. Several kinds act together; kinds marked *list* take several entries. Anything outside the grammar,
-or a kind that the environment's robot does not honour, raises `DisturbanceError` when the environment is made or reset,
-with the key, the value and what is allowed.
+Values are drawn at each reset from the environment's own seeded generator; `env.unwrapped.sampled_disturbances` holds
+what was drawn, in the same grammar, and `info` the same as numbers (`disturbance.payload.mass`). What `reset` is given
+replaces the disturbances of this and the following episodes; nothing is merged.
+
+Several kinds act together; kinds marked *list* take several entries. Anything outside the grammar, or a kind that the
+environment's robot does not honour, raises `DisturbanceError` when the environment is made or reset, with the key, the
+value and what is allowed.
 
 """
 

@@ -11,6 +11,7 @@ from artde_gym.multibody.spec import Vector
 from artde_gym.sim.engine import World
 
 NEVER = 2**62  # steps
+EVENTS = PUSH_BEGINS, PUSH_ENDS, ATTACHED, DROPPED = "push_begins", "push_ends", "payload_attached", "payload_dropped"
 
 
 class Push(NamedTuple):
@@ -38,12 +39,12 @@ class Schedule:
         self._pushes = [Push.of(entry, time_step) for entry in realised.get("push", ())]
         self._payload: Mapping[str, Any] = realised.get("payload", {})
         self._changes: dict[int, list[str]] = {}
-        for number, push in enumerate(self._pushes):
-            self._announce(number, push)
+        for push in self._pushes:
+            self._announce(push)
         if self._payload and self._payload["drop"] > self._payload["attach"]:
             if self._payload["attach"] > 0:
-                self._add(round(self._payload["attach"] / time_step), "payload attached")
-            self._add(round(self._payload["drop"] / time_step), "payload dropped")
+                self._add(round(self._payload["attach"] / time_step), ATTACHED)
+            self._add(round(self._payload["drop"] / time_step), DROPPED)
 
     def start(self, world: World) -> None:
         """Bring about what is there before the first step."""
@@ -52,7 +53,7 @@ class Schedule:
 
     def add(self, push: Push) -> None:
         """One more push than was drawn."""
-        self._announce(len(self._pushes), push)
+        self._announce(push)
         self._pushes.append(push)
 
     def drop(self, step: int) -> bool:
@@ -60,9 +61,9 @@ class Schedule:
         time = step * self._time_step
         if not self._payload or not self._payload["attach"] <= time < self._payload["drop"]:
             return False
-        self._changes[round(self._payload["drop"] / self._time_step)].remove("payload dropped")
+        self._changes[round(self._payload["drop"] / self._time_step)].remove(DROPPED)
         self._payload = {**self._payload, "drop": time}
-        self._add(step, "payload dropped")
+        self._add(step, DROPPED)
         return True
 
     def quiet(self, first: int, end: int) -> bool:
@@ -80,12 +81,12 @@ class Schedule:
         return [push for push in self._pushes if push.first <= step < push.end]
 
     def apply(self, step: int, world: World) -> list[str]:
-        """Bring about what belongs to a step; returns what begins or ends with it, in words."""
+        """Bring about what belongs to a step; returns which of `EVENTS` happen with it."""
         events = self._changes.get(step, [])
         for event in events:
-            if event == "payload attached":
+            if event == ATTACHED:
                 self._attach(world)
-            elif event == "payload dropped":
+            elif event == DROPPED:
                 world.release_payload()
         for push in self.acting(step):
             world.push(push.site, push.force)
@@ -95,9 +96,9 @@ class Schedule:
         x, y, z = self._payload["position"]
         world.attach_payload(self._payload["mass"], (x, y, z))
 
-    def _announce(self, number: int, push: Push) -> None:
-        self._add(push.first, f"push {number} begins")
-        self._add(push.end, f"push {number} ends")
+    def _announce(self, push: Push) -> None:
+        self._add(push.first, PUSH_BEGINS)
+        self._add(push.end, PUSH_ENDS)
 
     def _add(self, step: int, event: str) -> None:
         self._changes.setdefault(step, []).append(event)

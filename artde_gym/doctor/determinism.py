@@ -46,7 +46,7 @@ def digest(name: str) -> str:
     robot, engine = name.split(" in ")
     env: Any
     if engine == "batch":
-        env = gym.make_vec(FLIGHT, 4, "vector_entry_point", duration=5.0)
+        env = gym.make_vec(FLIGHT, 4, "vector_entry_point", duration=5.0, engine="numpy")
     else:
         env = gym.make(WALK if robot == "biped" else FLIGHT, disable_env_checker=True, duration=3.0, engine=engine)
     policy = make_controller("artde", env)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import json
 import warnings
 from collections.abc import Callable
 from typing import Any
@@ -15,8 +16,9 @@ from gymnasium.utils.env_checker import check_env
 import artde_gym  # noqa: F401  # registers the environments
 from artde_gym.doctor.outcome import Outcome
 from artde_gym.errors import OptionError
-from artde_gym.evaluation.environments import ours
+from artde_gym.evaluation.environments import ours, vector
 
+ARGUMENTS: dict[str, Any] = {"duration": 3.0, "disturbances": {"payload": 0.3}}
 IN_SI_UNITS = r".*(symmetric and normalized|recommend using np.float32)"
 """Warnings that are no findings: actions are in Nm and N, and float64, by design; RescaleAction gives [-1, 1]."""
 REMEDY = "pip install -c constraints.txt --force-reinstall . : the tests pass with these versions"
@@ -49,7 +51,7 @@ def batch() -> list[Outcome]:
         if gym.spec(name).vector_entry_point is None:
             continue
         try:
-            both: list[Any] = [gym.make_vec(name, size, "vector_entry_point", duration=3.0) for size in (8, 1)]
+            both: list[Any] = [vector(name, json.dumps(ARGUMENTS), size) for size in (8, 1)]
         except OptionError as error:  # the biped's are MuJoCo's
             outcomes.append(Outcome(name, "missing", f"{error.field} {error.value!r} is not there", error.allowed))
             continue
@@ -74,7 +76,7 @@ def _gymnasium(env: Any) -> None:
 
 def _checked(name: str, engine: str, checker: Callable[[Any], None]) -> Outcome:
     try:
-        env = gym.make(name, disable_env_checker=True, duration=3.0, engine=engine)
+        env = gym.make(name, disable_env_checker=True, engine=engine, **ARGUMENTS)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             warnings.filterwarnings("ignore", message=IN_SI_UNITS)

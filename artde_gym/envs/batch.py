@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import abc
+import copy
+import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
 import gymnasium as gym
 import numpy as np
@@ -13,19 +15,23 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from artde_gym.arguments import flag
+from artde_gym.arguments import real_array, seed_number
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
-from artde_gym.envs.options import disturbances_in
+from artde_gym.disturbances.numeric import Words, numeric
+from artde_gym.disturbances.schedule import EVENTS
+from artde_gym.envs.closed import refuse
+from artde_gym.envs.counted import Counted
+from artde_gym.envs.options import disturbances_in, warn_of_idle
 from artde_gym.errors import ActionError, OptionError
+from artde_gym.info import FELL, REWARD, Columns, Mask, SampledTable, cleared, masked, prefixed
 from artde_gym.layout import Layout
 from artde_gym.tracking import Tracking
 
-Mask = NDArray[np.bool_]
 Order = Literal["C", "F"]
 
 
-class BatchEnv(VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
+class BatchEnv(Counted, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
     """Many environments in one. Each has a generator of its own, and does the same whatever the number beside it.
 
     A subclass says what happens; observations and actions are (n, size), in its `order` of memory.
@@ -33,8 +39,12 @@ class BatchEnv(VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
     Args:
         num_envs: number of environments.
         dtype: of all numbers.
-        autoreset: whether an episode that is over begins anew with the next step, which ignores its action, or waits
-            for a reset, unmoved.
+        engine: None for the one in which this class runs, with a warning if `gym.make` would take another one.
+        render_mode: None; a picture is drawn by single environments.
+        autoreset_mode: Gymnasium's. With `NEXT_STEP` an episode that is over begins anew with the next step, which
+            ignores its action; with `SAME_STEP` at once, its last observation and info being in `info["final_obs"]` and
+            `info["final_info"]`; with `DISABLED` it waits for a reset, unmoved.
+        max_episode_steps: after which an episode is truncated, if its duration is longer.
 
     Raises:
         OptionError: for an argument out of range.
@@ -50,17 +60,33 @@ class BatchEnv(VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
     reward_scales: ClassVar[Mapping[str, float]]
     fall_reasons: ClassVar[Sequence[str]]
     allowed_action: ClassVar[str]
+    own_engine: ClassVar[str]
     control_period: float
+    words: Words
     _disturbances: Disturbances
-    _last: int  # control period with which an episode ends
     _np_random: Any  # a list: one for each environment, as for the seeds
     _np_random_seed: Any
 
     def __init__(
-        self, num_envs: int, dtype: Literal["float64", "float32"] = "float64", *, autoreset: bool = True
+        self,
+        num_envs: int,
+        dtype: Literal["float64", "float32"] = "float64",
+        *,
+        engine: str | None,
+        render_mode: None,
+        autoreset_mode: AutoresetMode | str,
+        max_episode_steps: int | None,
     ) -> None:
         if isinstance(num_envs, bool) or not (isinstance(num_envs, int) and num_envs >= 1):
             raise OptionError("num_envs", num_envs, "a whole number >= 1")
+        if render_mode is not None:
+            raise OptionError("render_mode", render_mode, "None; vectorization_mode='sync' draws pictures")
+        if not (max_episode_steps is None or (isinstance(max_episode_steps, int) and max_episode_steps >= 1)):
+            raise OptionError("max_episode_steps", max_episode_steps, "a whole number >= 1, or None")
+        self.autoreset_mode = _mode(autoreset_mode)
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
+        self._limit = max_episode_steps
+        self._check_engine(engine)
         self.num_envs = num_envs
         self.dtype = np.dtype(dtype)
         self.single_observation_space = self.observation_layout.box(self.dtype)
@@ -68,13 +94,12 @@ class BatchEnv(VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
         self._low, self._high = self.single_action_space.low, self.single_action_space.high
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        if not autoreset:
-            self.metadata = {**self.metadata, "autoreset_mode": AutoresetMode.DISABLED}
-        self._autoreset = flag("autoreset", autoreset)
         seeded = [seeding.np_random() for _ in range(num_envs)]
         self._np_random, self._np_random_seed = map(list, zip(*seeded, strict=True))
         self._k = np.zeros(num_envs, np.int64)
         self._over: Mask | None = None  # where an episode has ended; None before the first reset
+        self._realised: list[Mapping[str, Any]] = [{}] * num_envs
+        self._table = SampledTable(num_envs)
 
     @abc.abstractmethod
     def _parse(self, disturbances: Mapping[str, Any]) -> Disturbances:
@@ -104,6 +129,17 @@ class BatchEnv(VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
         """More entries of `info`, by name, one value an environment."""
         return {}
 
+    def _end(self, ended: Mask) -> None:
+        """Episodes have ended and wait; they are not to move."""
+
+    def __copy__(self) -> Self:
+        return copy.deepcopy(self)  # two of them cannot share their worlds
+
+    @property
+    def sampled_disturbances(self) -> list[dict[str, Any]]:
+        """The disturbances of each episode in the grammar of `artde_gym.disturbances`."""
+        return [copy.deepcopy(dict(realised)) for realised in self._realised]
+
     def get_attr(self, name: str) -> tuple[Any, ...]:
         """An attribute, once for each environment."""
         return (getattr(self, name),) * self.num_envs
@@ -121,6 +157,7 @@ class BatchEnv(VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
             OptionError: for an unknown option or value, or a scenario that needs another environment.
             DisturbanceError: for a malformed disturbance.
         """
+        refuse(closed=self.closed)
         if not isinstance(options, Mapping | None):
             raise OptionError("reset options", options, "a mapping")
         options = dict(options or {})
@@ -129,15 +166,18 @@ class BatchEnv(VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
         disturbances = disturbances_in(options, self)
         if disturbances is not None:
             self._disturbances = self._parse(disturbances)
+            warn_of_idle(self._disturbances, self._last * self.control_period)
         for i in np.flatnonzero(mask).tolist():
             if seeds[i] is not None:
                 self._np_random[i], self._np_random_seed[i] = seeding.np_random(seeds[i])
-        info = self._begin(mask)
+        self._begin(mask)
         self._over = np.zeros(self.num_envs, np.bool_) if self._over is None else self._over & ~mask
         observations = self._truth()
         self._measure(observations, mask)
-        self._inform(info, mask)
-        return observations, info
+        terms = {name: np.zeros(self.num_envs, self.dtype) for name in self.reward_scales}
+        nowhere = np.zeros(self.num_envs, np.bool_)
+        told = prefixed(REWARD, terms) | self._counts({}) | self._reasons(nowhere, [nowhere] * len(self.fall_reasons))
+        return observations, self._info(mask, told)
 
     def step(self, actions: ArrayLike) -> tuple[Array, Array, Mask, Mask, dict[str, Any]]:
         """Apply actions for one control period; episodes that were over begin anew instead, or wait.
@@ -145,43 +185,69 @@ class BatchEnv(VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
         Raises:
             ActionError: for a wrong shape, or a value that is not finite in an episode that goes on.
             gymnasium.error.ResetNeeded: before the first reset.
+            gymnasium.error.ClosedEnvironmentError: after `close`.
         """
+        refuse(closed=self.closed)
         if self._over is None:
             raise gym.error.ResetNeeded("the episodes have not begun: call reset()")
         over, goes_on = self._over, ~self._over
+        begun = over if self.autoreset_mode is AutoresetMode.NEXT_STEP else np.zeros_like(over)
         events = self._advance(self._commands(actions), goes_on)
         self._k += goes_on
-        info = self._begin(over) if self._autoreset else {}
+        self._begin(begun)
         observations = self._truth()
         terms, falls = self._score(observations)
         total: Any = 0.0
         for name, scale in self.reward_scales.items():
             total = total + scale * terms[name]
         rewards = np.where(over, 0.0, np.asarray(self.control_period * total, np.float64))
-        self._measure(observations, goes_on | self._autoreset)
+        self._measure(observations, goes_on | begun)
         terminated = np.logical_or.reduce(falls) & goes_on
         truncated = (self._k >= self._last) & goes_on
-        self._over = terminated | truncated if self._autoreset else over | terminated | truncated
-        self._inform(info, np.ones_like(over))
-        info["reward_terms"] = {**terms, **{f"_{name}": goes_on.copy() for name in terms}}
-        info["_reward_terms"] = goes_on
-        if terminated.any():
-            words: dict[int, str] = {}
-            for word, fell in zip(reversed(self.fall_reasons), reversed(falls), strict=True):  # the first reason wins
-                words.update(dict.fromkeys(np.flatnonzero(fell & terminated).tolist(), word))
-            info["fall_reason"], info["_fall_reason"] = self._objects(words)
-        if events:
-            info["events"], info["_events"] = self._objects(events)
+        ended = terminated | truncated
+        told = cleared(prefixed(REWARD, terms), over) | self._counts(events) | self._reasons(terminated, falls)
+        info = self._info(np.ones_like(over), told)
+        if self.autoreset_mode is AutoresetMode.NEXT_STEP:
+            self._over = ended.copy()
+        elif ended.any():
+            if self.autoreset_mode is AutoresetMode.SAME_STEP:
+                observations, info = self._renew(observations, info, told, ended)
+            else:
+                self._over = over | ended
+                self._end(ended)
         return observations, rewards, terminated, truncated, info
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Free what the environment holds; see `close`."""
+
+    def _check_engine(self, engine: str | None) -> None:
+        """Tell where a vector runs that nobody has asked to run there."""
+        if engine is None:
+            warnings.warn(
+                f"{type(self).__name__} runs in {self.own_engine!r}, gym.make in 'bullet' unless told otherwise, so "
+                f"that results differ; give engine={self.own_engine!r} if this is meant",
+                stacklevel=6,  # where gymnasium.make_vec was called
+            )
+        elif engine != self.own_engine:
+            allowed = f"{self.own_engine!r}; for engine {engine!r}: gym.make_vec(..., vectorization_mode='sync')"
+            raise OptionError("engine", engine, allowed)
+
+    def _renew(
+        self, observations: Array, info: dict[str, Any], told: Columns, ended: Mask
+    ) -> tuple[Array, dict[str, Any]]:
+        """Begin episodes anew in the step that has ended them."""
+        final = {"final_obs": np.where(ended[:, None], observations, 0.0), "final_info": masked(info, ended)}
+        self._begin(ended)
+        renewed = self._truth()
+        self._measure(renewed, ended)
+        begun = self._info(np.ones_like(ended), cleared(told, ended))
+        return renewed, begun | masked(final, ended.copy())
 
     def _commands(self, actions: ArrayLike) -> Array:
         """Checked actions as an array of ours."""
         shape = self.action_space.shape
-        try:
-            with np.errstate(over="ignore"):  # of a cast to float32
-                commands = np.array(actions, dtype=self.dtype, order=self.order)
-        except (TypeError, ValueError, OverflowError) as error:
-            raise ActionError("actions", actions, f"numbers of the shape {shape}") from error
+        with np.errstate(over="ignore"):  # of a cast to float32
+            commands = real_array("actions", actions, f"numbers of the shape {shape}", self.dtype, self.order)
         if commands.shape != shape:
             raise ActionError("shape of the actions", commands.shape, str(shape))
         commands[self._over] = 0.0
@@ -201,35 +267,56 @@ class BatchEnv(VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
             raise OptionError("reset_mask", given, "all true in the first reset")
         return mask
 
-    def _seeds(self, given: int | Sequence[int | None] | None) -> list[int | None]:
-        if given is None:
-            return [None] * self.num_envs
-        if isinstance(given, (int, np.integer)):
-            given = range(int(given), int(given) + self.num_envs)
-        if not isinstance(given, (Sequence, np.ndarray)) or len(given) != self.num_envs:
+    def _seeds(self, given: Any) -> list[int | None]:
+        if not isinstance(given, Sequence) and np.ndim(given) == 0:
+            first = seed_number("seed", given)
+            return [first + i for i in range(self.num_envs)] if first is not None else [None] * self.num_envs
+        if isinstance(given, str) or len(given) != self.num_envs:
             raise OptionError("seed", given, f"None, a number, or {self.num_envs} of them, one for each environment")
-        for seed in given:
-            if not (seed is None or (isinstance(seed, (int, np.integer)) and seed >= 0)):
-                raise OptionError("seed", seed, "a whole number >= 0, or None")
-        return [None if seed is None else int(seed) for seed in given]
+        return [seed_number("seed", seed) for seed in given]
 
-    def _begin(self, mask: Mask) -> dict[str, Any]:
-        """Begin new episodes where the mask is true; returns what is to be told of them."""
+    def _begin(self, mask: Mask) -> None:
+        """Begin new episodes where the mask is true."""
         if not mask.any():
-            return {}
+            return
         drawn = {i: self._disturbances.draw(self._np_random[i]) for i in np.flatnonzero(mask).tolist()}
         self._k[mask] = 0
         self._start(drawn)
-        values, known = self._objects(drawn)
-        return {"disturbances": values, "_disturbances": known}
+        if mask.all():
+            self._table = SampledTable(self.num_envs)  # without the room that other disturbances have needed
+        for i, realised in drawn.items():
+            self._realised[i] = realised
+            self._table.enter(i, numeric(realised, self.words))
 
-    def _inform(self, info: dict[str, Any], mask: Mask) -> None:
-        for name, values in {"time_s": self._k * self.control_period, **self._tell()}.items():
-            info[name], info[f"_{name}"] = values, mask.copy()
+    def _info(self, mask: Mask, told: Columns) -> dict[str, Any]:
+        """Tell of the environments in a mask what policies are not meant to see.
 
-    def _objects(self, known: Mapping[int, Any]) -> tuple[NDArray[Any], Mask]:
-        """What is known of some environments as an array, and the mask of these."""
-        values, mask = np.full(self.num_envs, None, dtype=object), np.zeros(self.num_envs, np.bool_)
-        for i, value in known.items():
-            values[i], mask[i] = value, True
-        return values, mask
+        `told` are terms of the reward, counts of events, and reasons of falls.
+        """
+        own = {"time_s": self._k * self.control_period, **self._tell(), **self._table.told(), **told}
+        return masked(own, mask.copy())
+
+    def _counts(self, events: Mapping[int, list[str]]) -> Columns:
+        """Count each kind of event in each environment."""
+        counts = {name: np.zeros(self.num_envs, np.int64) for name in EVENTS}
+        for i, names in events.items():
+            for name in names:
+                counts[name][i] += 1
+        return counts
+
+    def _reasons(self, terminated: Mask, falls: Sequence[Mask]) -> Columns:
+        """Mark the first reason that holds, where an episode was terminated."""
+        reasons: Columns = {}
+        left = terminated
+        for name, fell in zip(self.fall_reasons, falls, strict=True):
+            reasons[FELL + name] = fell & left
+            left = left & ~fell
+        return reasons
+
+
+def _mode(given: AutoresetMode | str) -> AutoresetMode:
+    """Gymnasium's mode, by itself, its name or its value."""
+    for mode in AutoresetMode:
+        if given in (mode, mode.value, mode.name):
+            return mode
+    raise OptionError("autoreset_mode", given, ", ".join(repr(mode.value) for mode in AutoresetMode))

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from artde_gym.arguments import action_array
+from artde_gym.arguments import action_array, known_arguments, seed_number
 from artde_gym.arrays import Array
 from artde_gym.disturbances.ground import LOADED
 from artde_gym.disturbances.schedule import Schedule
@@ -19,12 +19,14 @@ from artde_gym.envs.biped_course import Course
 from artde_gym.envs.closed import CLOSED
 from artde_gym.envs.documentation import filled
 from artde_gym.envs.live import Live
-from artde_gym.envs.options import disturbances_in
+from artde_gym.envs.options import disturbances_in, warn_of_idle
 from artde_gym.envs.view import View
 from artde_gym.errors import OptionError
+from artde_gym.info import REWARD, count_events, flag_reason, prefixed
 from artde_gym.robots.ojas import model as robot
 from artde_gym.robots.ojas import task
 from artde_gym.robots.ojas.model import ActuatorInertia
+from artde_gym.robots.ojas.walking import WalkingPattern
 from artde_gym.sim.engine import Camera, Engine
 from artde_gym.sim.factory import EngineName, make_engine
 from artde_gym.sim.rotation import arcsine, roll_pitch
@@ -41,12 +43,18 @@ _PAGE = (
 With `render_mode="rgb_array"`, `render` draws 30 pictures a simulated second; asked more often, it gives the last one
 again. Words of your own in `env.unwrapped.view.caption` are written into each of them.
 
+Gymnasium's `RecordVideo` takes a picture a step and plays `metadata["render_fps"]` of them a second: up to 100 steps a
+second in real time, and more of them, at shorter control periods, in slow motion. `artde-gym video` is in real time.
+
 `reset(options={{"disturbances": ..., "scenario": "S2"}})` replaces the disturbances of this and the following
-episodes, by a mapping or by those of a named scenario.
+episodes, by a mapping or by those of a named scenario; nothing is merged: what a mapping leaves out does not happen.
 
 ## Info
-`time_s`, `reward_terms`, `foot_loads` (normal force on each foot, N); at reset `disturbances` (realised values, as
-the grammar writes them); `events` when a push or a payload begins or ends; after a fall `fall_reason`."""
+The same keys after `reset` and after `step`, numbers and arrays alone (`artde_gym.info`): `time_s`; the terms of the
+reward, `reward_alive` and so on; `foot_loads` (normal force on each foot, N); what was sampled,
+`disturbance.payload.mass` and so on, and the same in the grammar in `env.unwrapped.sampled_disturbances`; how many
+pushes and payloads began and ended in this control period, `push_begins`, `push_ends`, `payload_attached`,
+`payload_dropped`; why it fell, `fell_tilt`, `fell_height`, `fell_speed` (true or false)."""
 )
 
 
@@ -76,7 +84,9 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
     action_layout = task.ACTION
     robot_name: ClassVar[str] = "ojas"
     tracking = task.TRACKING
+    fall_reasons: ClassVar[Sequence[str]] = task.FALL_REASONS
 
+    @known_arguments
     def __init__(
         self,
         *,
@@ -100,7 +110,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         walk = self._walk = task.Walk.of(
             control_period, actuator_inertia, arms, self_collision, speed, step_duration, duration
         )
-        self.nominal_robot, self.pattern, self.control_period = walk.nominal_robot, walk.pattern, walk.control_period
+        self.nominal_robot, self.control_period = walk.nominal_robot, walk.control_period
         self._disturbances = walk.parse(self.default_disturbances if disturbances is None else disturbances)
         self._engine: Engine = make_engine(engine, walk.robot, task.TIME_STEP, renders=render_mode is not None)
         camera = Camera((0.0, 0.0, CAMERA_HEIGHT), width=width, height=height)
@@ -115,8 +125,10 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self._engine.place(walk.position, walk.start)
         self._still = self._settle(walk.start, task.SETTLE_STEPS)
         self._settled = self._engine.snapshot()
-        self._k = walk.last  # no step before the first reset
-        self._state, self._realised = self._engine.read(), {}
+        self._k, self._last, self._over = 0, walk.last, True  # no step before the first reset
+        self._state, self.words = self._engine.read(), walk.words
+        self._sample({})
+        warn_of_idle(self._disturbances, self._last * self.control_period)
         self._course = Course(self._realised, walk, self.np_random)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
@@ -126,17 +138,19 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
             OptionError: for an unknown option, or a scenario that needs another environment.
             DisturbanceError: for a malformed disturbance.
         """
-        super().reset(seed=seed)
+        self._require_open()
         disturbances = disturbances_in(options or {}, self)
         if disturbances is not None:
             self._disturbances = self._walk.parse(disturbances)
+            warn_of_idle(self._disturbances, self._last * self.control_period)
+        super().reset(seed=seed_number("seed", seed))
         realised = self._disturbances.draw(self.np_random)
-        self._realised = realised
+        self._sample(realised)
         self._tau = self._begin(realised)
-        self._k = 0
+        self._k, self._over = 0, False
         self.view.reset()
-        info: dict[str, Any] = {"time_s": 0.0, "disturbances": realised}
-        return self._measure(info), info
+        observation = self._measure()
+        return observation, self._info(dict.fromkeys(task.REWARD_SCALES, 0.0), (), ())
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Apply joint torques for one control period.
@@ -145,37 +159,39 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
             ActionError: for a wrong shape or a value that is not finite.
             gymnasium.error.ResetNeeded: after the end of the walk, or before the first reset.
         """
-        if self._k >= self._walk.last:
+        self._require_open()
+        if self._over:
             raise gym.error.ResetNeeded("the walk is over or has not begun: call reset()")
         action = action_array(action, task.N_JOINTS, "torques (Nm)")
         previous = self._tau
         events = self._simulate(np.minimum(np.maximum(action, self._low), self._high))
         self._k += 1
-        info: dict[str, Any] = {"time_s": self._k * self.control_period}
-        observation = self._measure(info)
-        terms = info["reward_terms"] = self._reward_terms(previous)
+        observation = self._measure()
+        terms = self._reward_terms(previous)
         reward = self.control_period * sum(map(operator.mul, task.REWARD_SCALES.values(), terms.values()))
-        if events:
-            info["events"] = events
         falls = self._falls()
-        fell = any(falls)
-        if fell:
-            info["fall_reason"] = task.FALL_REASONS[falls.index(True)]
-        return observation, reward, fell, self._k >= self._walk.last, info
+        fell, truncated = any(falls), self._k >= self._last
+        self._over = fell or truncated
+        return observation, reward, fell, truncated, self._info(terms, falls, events)
 
     def render(self) -> NDArray[np.uint8] | None:
         """A picture from a camera that walks along; None without a render mode."""
+        self._require_open()
         if self.render_mode is None:
             return None
         step = self.elapsed
         home = (float(self.pattern.base[step, 0]), 0.0, CAMERA_HEIGHT)
         pushes = self.schedule.acting(step)
-        over = self._k >= self._walk.last or any(self._falls())
-        return self.view.picture(step * task.TIME_STEP, home, pushes, self._realised, over=over)
+        return self.view.picture(step * task.TIME_STEP, home, pushes, self._realised, over=self._over)
 
     def close(self) -> None:
         self._engine.close()
         self._engine = self.view = CLOSED
+
+    @property
+    def pattern(self) -> WalkingPattern:
+        """What is walked."""
+        return self._walk.pattern
 
     @property
     def elapsed(self) -> int:
@@ -216,10 +232,21 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self._tau = course.applied()
         return events
 
-    def _measure(self, info: dict[str, Any]) -> Array:
-        """Read the engine; returns the observation and puts into `info` what policies are not meant to see."""
+    def _info(self, terms: dict[str, float], falls: Sequence[bool], events: Sequence[str]) -> dict[str, Any]:
+        """Tell what policies are not meant to see."""
+        return {
+            "time_s": self._k * self.control_period,
+            **prefixed(REWARD, terms),
+            "foot_loads": np.array(self._loads),
+            **self._sampled(),
+            **count_events(events),
+            **flag_reason(task.FALL_REASONS, falls),
+        }
+
+    def _measure(self) -> Array:
+        """Read the engine; returns the observation."""
         state = self._state = self._engine.read()
-        loads = info["foot_loads"] = self._engine.foot_loads()
+        loads = self._loads = self._engine.foot_loads()
         self._tilt = roll_pitch(state.quat_xyzw, math.atan2, arcsine)
         contact = [load > LOADED for load in loads]
         plan = self._walk.plan[self._k]

@@ -7,8 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 import numpy as np
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
+from artde_gym.arguments import known_arguments
 from artde_gym.arrays import Array, each
 from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.ground import LOADED
@@ -17,6 +19,7 @@ from artde_gym.disturbances.sensing import Sensing
 from artde_gym.envs.batch import BatchEnv, Mask
 from artde_gym.envs.biped_course import Course
 from artde_gym.envs.documentation import filled
+from artde_gym.envs.options import warn_of_idle
 from artde_gym.errors import OptionError
 from artde_gym.robots.ojas import model as robot
 from artde_gym.robots.ojas import task
@@ -28,23 +31,26 @@ _PAGE = (
     task.DOCUMENTATION
     + """
 | `num_envs` | 1 | from 1 | number of robots |
-| `engine` | "mujoco" | "mujoco" | physics engine; Bullet has no batches |
+| `engine` | None | None, "mujoco" | physics engine; Bullet has no batches, and None warns of it |
 | `threads` | 1 | from 1 | that step the robots; no result depends on it |
-| `autoreset` | True | False, True | whether a walk that is over begins anew, or waits for a reset |
+| `autoreset_mode` | "NextStep" | "NextStep", "SameStep", "Disabled" | Gymnasium's `AutoresetMode` |
+| `max_episode_steps` | None | from 1 | after which a walk is truncated, if its duration is longer |
+| `render_mode` | None | None | `vectorization_mode="sync"` draws pictures |
 
 `reset(options={{"disturbances": ..., "scenario": "S2"}})` replaces the disturbances of this and the following
-episodes, by a mapping or by those of a named scenario. The option `"reset_mask"` (n,) says where to reset.
+episodes, by a mapping or by those of a named scenario; nothing is merged: what a mapping leaves out does not happen.
+The option `"reset_mask"` (n,) says where to reset.
 
 ## Many at once
 This is for `gym.make_vec(..., vectorization_mode="vector_entry_point")`: each robot does the same to the bit as the one
 of `gym.make(..., engine="mujoco")` with the same seed and the same actions, whatever the number of robots and of
-threads. Each has a generator of its own. A walk that is over begins anew with the next step, which ignores its action
-(Gymnasium's next-step autoreset); with `autoreset=False` it waits, unmoved, until a reset whose mask it is in.
+threads. Each has a generator of its own. A walk that is over begins anew with the next step, which ignores its action;
+with `autoreset_mode="SameStep"` it begins anew at once, and `info["final_obs"]` and `info["final_info"]` tell how it
+ended; with `"Disabled"` it waits, unmoved, until a reset whose mask it is in.
 
 ## Info
-As Gymnasium's vector environments give it, every entry `x` with a mask `_x`: `time_s`, `reward_terms`, `foot_loads`
-(normal force on each foot, N) (n, 2); where a walk begins `disturbances` (an array of mappings); `events` (of lists);
-`fall_reason` (of words)."""
+That of the single environment, each entry `x` with a mask `_x` (n,), in nested dictionaries too: numbers and booleans
+(n,), arrays (n, ...). `env.unwrapped.sampled_disturbances` is a list."""
 )
 
 COLUMNS = task.OBSERVATION.slices
@@ -60,9 +66,9 @@ class BipedVectorEnv(BatchEnv):
 
     Args:
         num_envs: number of robots.
-        engine: "mujoco".
+        engine: "mujoco"; None as well, with a warning that it is not the one of `gym.make`.
         threads: that step the robots.
-        autoreset: whether a walk that is over begins anew by itself.
+        render_mode, autoreset_mode, max_episode_steps: see `artde_gym.envs.batch.BatchEnv`.
         disturbances: as all further arguments, see `artde_gym.envs.biped.BipedEnv`.
 
     Raises:
@@ -77,7 +83,9 @@ class BipedVectorEnv(BatchEnv):
     reward_scales = task.REWARD_SCALES
     fall_reasons = task.FALL_REASONS
     allowed_action = "torques (Nm)"
+    own_engine = "mujoco"
 
+    @known_arguments
     def __init__(
         self,
         num_envs: int = 1,
@@ -91,22 +99,31 @@ class BipedVectorEnv(BatchEnv):
         step_duration: float = 1.0,
         duration: float = 58.0,
         observe_ground_force: bool = False,
-        engine: Literal["mujoco"] = "mujoco",
+        engine: Literal["mujoco"] | None = None,
         threads: int = 1,
-        autoreset: bool = True,
+        render_mode: None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | None = None,
     ) -> None:
         if isinstance(threads, bool) or not (isinstance(threads, int) and threads >= 1):
             raise OptionError("threads", threads, "a whole number >= 1")
         self.observe_ground_force = observe_ground_force
         self.observation_layout = task.observation_layout(observe_ground_force)
-        super().__init__(num_envs, autoreset=autoreset)
+        super().__init__(
+            num_envs,
+            engine=engine,
+            render_mode=render_mode,
+            autoreset_mode=autoreset_mode,
+            max_episode_steps=max_episode_steps,
+        )
         walk = self._walk = task.Walk.of(
             control_period, actuator_inertia, arms, self_collision, speed, step_duration, duration
         )
-        self.nominal_robot, self.pattern, self.control_period = walk.nominal_robot, walk.pattern, walk.control_period
-        self._last = walk.last
+        self.nominal_robot, self.control_period = walk.nominal_robot, walk.control_period
+        self._last, self.words = min(walk.last, self._limit or walk.last), walk.words
         self._disturbances = self._parse(self.default_disturbances if disturbances is None else disturbances)
-        self._batch = make_batch(engine, walk.robot, num_envs, task.TIME_STEP, threads)
+        warn_of_idle(self._disturbances, self._last * self.control_period)
+        self._batch = make_batch("mujoco", walk.robot, num_envs, task.TIME_STEP, threads)
         self._courses: dict[int, Course] = {}
         self._wakes = np.full(num_envs, NEVER)  # time step of each walk in which its course is to be asked again
         self._sensing: dict[int, Sensing] = {}  # where sensors err

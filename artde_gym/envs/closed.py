@@ -6,6 +6,8 @@ from typing import Any, NoReturn
 
 import gymnasium as gym
 
+CLOSED_MESSAGE = "the environment is closed: make a new one"
+
 
 class _ClosedEngine:
     """In place of an engine (`artde_gym.sim.engine.Engine`): whatever it is asked, the answer is an error."""
@@ -14,7 +16,22 @@ class _ClosedEngine:
         """Closed it is."""
 
     def __getattr__(self, name: str) -> NoReturn:
-        raise gym.error.ClosedEnvironmentError("the environment is closed: make a new one")
+        if name.startswith("__"):
+            raise AttributeError(name)  # as Python asks when it copies
+        raise gym.error.ClosedEnvironmentError(CLOSED_MESSAGE)
+
+    def __reduce__(self) -> str:
+        return "CLOSED"  # of which there is one, also in a copy
+
+
+def refuse(*, closed: bool) -> None:
+    """Refuse to go on.
+
+    Raises:
+        gymnasium.error.ClosedEnvironmentError: if the environment is closed.
+    """
+    if closed:
+        raise gym.error.ClosedEnvironmentError(CLOSED_MESSAGE)
 
 
 CLOSED: Any = _ClosedEngine()

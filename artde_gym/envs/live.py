@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 import abc
+import copy
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Self
 
+from artde_gym.disturbances.numeric import Words, numeric
 from artde_gym.disturbances.schedule import Push, Schedule
+from artde_gym.envs.closed import CLOSED, refuse
+from artde_gym.envs.counted import Counted
 from artde_gym.errors import RobotError
+from artde_gym.info import copied
 from artde_gym.multibody.spec import RobotSpec, Vector
 from artde_gym.sim.engine import Engine
 
 
-class Live(abc.ABC):
+class Live(Counted, abc.ABC):
     """A part of an environment: pushes and drops that nobody planned, and a look at its world."""
 
     nominal_robot: RobotSpec
     _engine: Engine
     _realised: Mapping[str, Any]
+    words: Words
+
+    def __copy__(self) -> Self:
+        return copy.deepcopy(self)  # two of them cannot share a world
 
     @property
     @abc.abstractmethod
@@ -46,8 +55,23 @@ class Live(abc.ABC):
         dropped = self.schedule.drop(self.elapsed)
         if dropped:
             payload = {**self._realised["payload"], "drop": self.elapsed * self._engine.time_step}
-            self._realised = {**self._realised, "payload": payload}
+            self._sample({**self._realised, "payload": payload})
         return dropped
+
+    @property
+    def sampled_disturbances(self) -> dict[str, Any]:
+        """The disturbances of this episode in the grammar of `artde_gym.disturbances`, to be given to `reset` again."""
+        return copy.deepcopy(dict(self._realised))
+
+    def _sample(self, realised: Mapping[str, Any]) -> None:
+        self._realised, self._numbers = realised, numeric(realised, self.words)
+
+    def _sampled(self) -> dict[str, Any]:
+        """The disturbances of this episode as `info` has them."""
+        return copied(self._numbers)
+
+    def _require_open(self) -> None:
+        refuse(closed=self._engine is CLOSED)
 
     @property
     def engine(self) -> Engine:

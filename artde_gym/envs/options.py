@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from typing import Any
 
+from artde_gym.disturbances import Disturbances
 from artde_gym.errors import OptionError
 from artde_gym.scenarios import scenario
+
+
+def warn_of_idle(disturbances: Disturbances, duration: float) -> None:
+    """Warn of disturbances that were asked for and can never happen in an episode of `duration` seconds."""
+    for text in disturbances.idle(duration):
+        warnings.warn(text, stacklevel=5)  # where gymnasium.make was called
 
 
 def disturbances_in(options: Mapping[str, Any], env: Any) -> Mapping[str, Any] | None:

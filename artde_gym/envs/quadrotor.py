@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from artde_gym.arguments import action_array, steps_per_period
+from artde_gym.arguments import action_array, known_arguments, seed_number, steps_per_period
 from artde_gym.arrays import Array
 from artde_gym.disturbances.ground_effect import thrust_gain
 from artde_gym.disturbances.noise import draw_keys
@@ -20,10 +20,11 @@ from artde_gym.disturbances.wind import GRID, Wind
 from artde_gym.envs.closed import CLOSED
 from artde_gym.envs.documentation import filled
 from artde_gym.envs.live import Live
-from artde_gym.envs.options import disturbances_in
+from artde_gym.envs.options import disturbances_in, warn_of_idle
 from artde_gym.envs.quadrotor_sensors import Measurement, Sensors
 from artde_gym.envs.view import View
 from artde_gym.errors import OptionError
+from artde_gym.info import REWARD, count_events, flag_reason, prefixed
 from artde_gym.multibody.spec import Vector
 from artde_gym.robots.q450 import model as robot
 from artde_gym.robots.q450 import task
@@ -60,12 +61,20 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
     With `render_mode="rgb_array"`, `render` draws 30 pictures a simulated second; asked more often, it gives the last
     one again. Words of your own in `env.unwrapped.view.caption` are written into each of them.
 
+    Gymnasium's `RecordVideo` takes a picture a step and plays `metadata["render_fps"]` of them a second: up to 100
+    steps a second in real time, and more, at shorter control periods, in slow motion. `artde-gym video` is in real
+    time.
+
     `reset(options={{"disturbances": ..., "scenario": "Q1"}})` replaces the disturbances of this and the following
-    episodes, by a mapping or by those of a named scenario.
+    episodes, by a mapping or by those of a named scenario; nothing is merged, and what a mapping leaves out does not
+    happen.
 
     ## Info
-    `time_s`, `reward_terms`; at reset `disturbances` (realised values, as the grammar writes them); `events` when a
-    push or the payload begins or ends; after a crash `fall_reason`.
+    The same keys after `reset` and after `step`, numbers and arrays alone (`artde_gym.info`): `time_s`; the terms of
+    the reward, `reward_alive` and so on; what was sampled, `disturbance.payload.mass` and so on, and the same in the
+    grammar in `env.unwrapped.sampled_disturbances`; how many pushes and payloads began and ended in this control
+    period, `push_begins`, `push_ends`, `payload_attached`, `payload_dropped`; why it crashed, `fell_ground`,
+    `fell_inverted`, `fell_bounds` (true or false).
 
     ## Versions
     * v0: first version.
@@ -81,7 +90,10 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
     observation_layout = task.OBSERVATION
     robot_name: ClassVar[str] = "q450"
     tracking = task.TRACKING
+    fall_reasons: ClassVar[Sequence[str]] = task.FALL_REASONS
+    words = task.WORDS
 
+    @known_arguments
     def __init__(
         self,
         *,
@@ -115,7 +127,9 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self._engine.place(START, _NO_JOINTS)
         self._placed = self._engine.snapshot()
         self._k, self._over = 0, True  # no step before the first reset
-        self._schedule, self._realised = Schedule({}, TIME_STEP), {}
+        self._schedule = Schedule({}, TIME_STEP)
+        self._sample({})
+        warn_of_idle(self._disturbances, self._last * self.control_period)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
         """Start a flight; `options` are those of the class' documentation.
@@ -124,15 +138,17 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
             OptionError: for an unknown option, or a scenario that needs another environment.
             DisturbanceError: for a malformed disturbance.
         """
-        super().reset(seed=seed)
+        self._require_open()
         disturbances = disturbances_in(options or {}, self)
         if disturbances is not None:
             self._disturbances = task.parse(disturbances)
+            warn_of_idle(self._disturbances, self._last * self.control_period)
+        super().reset(seed=seed_number("seed", seed))
         realised = self._disturbances.draw(self.np_random)
-        self._realised = realised
+        self._sample(realised)
         self._begin(realised, draw_keys(self.np_random, task.STREAMS))
         self.view.reset()
-        return self._measure(), {"time_s": 0.0, "disturbances": realised}
+        return self._measure(), self._info(dict.fromkeys(task.REWARD_SCALES, 0.0), (), ())
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Apply a wrench for one control period.
@@ -141,6 +157,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
             ActionError: for a wrong shape or a value that is not finite.
             gymnasium.error.ResetNeeded: after the end of the flight, or before the first reset.
         """
+        self._require_open()
         if self._over:
             raise gym.error.ResetNeeded("the flight is over or has not begun: call reset()")
         action = action_array(action, 4, "[u1 (N), u2, u3, u4 (Nm)]")
@@ -150,19 +167,14 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         observation = self._measure()
         terms = self._reward_terms(before)
         reward = self.control_period * sum(map(operator.mul, task.REWARD_SCALES.values(), terms.values()))
-        info: dict[str, Any] = {"time_s": self._k * self.control_period, "reward_terms": terms}
-        if events:
-            info["events"] = events
         falls = self._falls()
-        terminated = any(falls)
-        if terminated:
-            info["fall_reason"] = task.FALL_REASONS[falls.index(True)]
-        truncated = self._k >= self._last
+        terminated, truncated = any(falls), self._k >= self._last
         self._over = terminated or truncated
-        return observation, reward, terminated, truncated, info
+        return observation, reward, terminated, truncated, self._info(terms, falls, events)
 
     def render(self) -> NDArray[np.uint8] | None:
         """A picture of the whole path from a camera that flies half-way along; None without a render mode."""
+        self._require_open()
         if self.render_mode is None:
             return None
         step = self.elapsed
@@ -199,6 +211,16 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self._k = 0
         self._over = False
         self._read()
+
+    def _info(self, terms: dict[str, float], falls: Sequence[bool], events: Sequence[str]) -> dict[str, Any]:
+        """Tell what policies are not meant to see."""
+        return {
+            "time_s": self._k * self.control_period,
+            **prefixed(REWARD, terms),
+            **self._sampled(),
+            **count_events(events),
+            **flag_reason(task.FALL_REASONS, falls),
+        }
 
     def _simulate(self, command: list[float]) -> list[str]:
         """Let `command` act for one control period, with what disturbs it; returns what began or ended meanwhile."""

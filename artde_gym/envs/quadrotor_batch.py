@@ -6,14 +6,16 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 import numpy as np
+from gymnasium.vector import AutoresetMode
 
-from artde_gym.arguments import steps_per_period
+from artde_gym.arguments import known_arguments, steps_per_period
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.noise import draw_keys
 from artde_gym.disturbances.wind import GRID
 from artde_gym.envs.batch import BatchEnv, Mask
 from artde_gym.envs.documentation import filled
+from artde_gym.envs.options import warn_of_idle
 from artde_gym.envs.quadrotor_fleet import Fleet
 from artde_gym.envs.quadrotor_sensors import Measurement, Sensors
 from artde_gym.errors import OptionError
@@ -33,16 +35,22 @@ class QuadInfinityPayloadVectorEnv(BatchEnv):
     Vehicle and payload are one rigid body until the drop. An environment does the same to the bit whatever the number
     of environments beside it. Each has a generator of its own.
 
-    A flight that is over begins anew with the next step, which ignores its action (Gymnasium's next-step autoreset).
+    A flight that is over begins anew with the next step, which ignores its action; with `autoreset_mode="SameStep"` it
+    begins anew at once, and `info["final_obs"]` and `info["final_info"]` tell how it ended; with `"Disabled"` it waits,
+    unmoved, until a reset whose mask (option `"reset_mask"`, (n,)) it is in.
     Observations are a transposed array, (size, n) in memory, so that each component is contiguous.
 
     {shared}
     | `num_envs` | 1 | from 1 | number of vehicles |
     | `dtype` | "float64" | "float64", "float32" | of all numbers, observations and actions included |
+    | `engine` | None | None, "numpy" | where it runs; None warns that it is not the engine of `gym.make` |
+    | `autoreset_mode` | "NextStep" | "NextStep", "SameStep", "Disabled" | Gymnasium's `AutoresetMode` |
+    | `max_episode_steps` | None | from 1 | after which a flight is truncated, if its duration is longer |
+    | `render_mode` | None | None | `vectorization_mode="sync"` draws pictures |
 
     ## Info
-    As Gymnasium's vector environments give it, every entry `x` with a mask `_x`: `time_s`, `reward_terms`; where a
-    flight begins `disturbances` (an array of mappings); `events` (of lists); `fall_reason` (of words).
+    That of the single environment, each entry `x` with a mask `_x` (n,), in nested dictionaries too: numbers and
+    booleans (n,), arrays (n, ...). `env.unwrapped.sampled_disturbances` is a list.
 
     ## Versions
     * v0: first version.
@@ -60,7 +68,10 @@ class QuadInfinityPayloadVectorEnv(BatchEnv):
     reward_scales = task.REWARD_SCALES
     fall_reasons = task.FALL_REASONS
     allowed_action = "[u1 (N), u2, u3, u4 (Nm)]"
+    own_engine = "numpy"
+    words = task.WORDS
 
+    @known_arguments
     def __init__(
         self,
         num_envs: int = 1,
@@ -70,10 +81,21 @@ class QuadInfinityPayloadVectorEnv(BatchEnv):
         measurement: Measurement = "ideal",
         duration: float = 70.0,
         dtype: Literal["float64", "float32"] = "float64",
+        engine: Literal["numpy"] | None = None,
+        render_mode: None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | None = None,
     ) -> None:
         if dtype not in ("float64", "float32"):
             raise OptionError("dtype", dtype, "'float64', 'float32'")
-        super().__init__(num_envs, dtype)
+        super().__init__(
+            num_envs,
+            dtype,
+            engine=engine,
+            render_mode=render_mode,
+            autoreset_mode=autoreset_mode,
+            max_episode_steps=max_episode_steps,
+        )
         self._disturbances = task.parse(task.DEFAULT_DISTURBANCES if disturbances is None else disturbances)
         steps = steps_per_period(control_period, GRID)
         self.control_period = steps * GRID
@@ -82,7 +104,9 @@ class QuadInfinityPayloadVectorEnv(BatchEnv):
         self._sensors = Sensors(num_envs, measurement, self.control_period, self.dtype)
         self.nominal_robot = robot.q450()
         self._plan = np.ascontiguousarray(task.plan(duration, self.control_period).T, dtype=self.dtype)
-        self._last = self._plan.shape[1] - 1
+        last = self._plan.shape[1] - 1
+        self._last = min(last, self._limit or last)
+        warn_of_idle(self._disturbances, self._last * self.control_period)
         sizes = [min(FLEET, num_envs - first) for first in range(0, num_envs, FLEET)]
         self._fleets = [
             (slice(first, first + size), Fleet(size, steps, self.dtype))
@@ -102,11 +126,20 @@ class QuadInfinityPayloadVectorEnv(BatchEnv):
 
     def _advance(self, commands: Array, goes_on: Mask) -> dict[int, list[str]]:
         self._before = [fleet.thrusts for _, fleet in self._fleets]
+        waits = self.autoreset_mode is AutoresetMode.DISABLED
         events: dict[int, list[str]] = {}
         for part, fleet in self._fleets:
+            still = np.flatnonzero(~goes_on[part] & waits)
+            motion = fleet.motion(still)
             told = fleet.advance(commands[part].T).items()
+            fleet.stop(still, motion)
             events.update((part.start + vehicle, words) for vehicle, words in told if goes_on[part.start + vehicle])
         return events
+
+    def _end(self, ended: Mask) -> None:
+        for i in np.flatnonzero(ended).tolist():
+            part, fleet = self._fleets[i // FLEET]
+            fleet.rest(i - part.start)
 
     def _truth(self) -> Array:
         out = np.empty((task.OBSERVATION.size, self.num_envs), self.dtype)

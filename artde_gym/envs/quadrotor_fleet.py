@@ -11,13 +11,13 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import DTypeLike
+from numpy.typing import DTypeLike, NDArray
 
 from artde_gym.arrays import Array
 from artde_gym.disturbances.ground_effect import thrust_gain
 from artde_gym.disturbances.kinds import KINDS
 from artde_gym.disturbances.noise import uniform_noise
-from artde_gym.disturbances.schedule import NEVER, Push
+from artde_gym.disturbances.schedule import ATTACHED, DROPPED, NEVER, PUSH_BEGINS, PUSH_ENDS, Push
 from artde_gym.disturbances.wind import GRID, Air, advance, air, processes, velocity
 from artde_gym.multibody.lag import follow, lag_shares
 from artde_gym.robots.q450 import model as robot
@@ -33,10 +33,10 @@ _SITES = {name: place for name, _, place in robot.q450().sites}
 
 
 class _Event(NamedTuple):
-    """What happens to one vehicle at the beginning of a step; `text` tells of it, if it is worth telling."""
+    """What happens to one vehicle at the beginning of a step; `told` are those of `EVENTS` that it is."""
 
     step: int
-    text: str
+    told: tuple[str, ...]
     act: Callable[[], None]
 
 
@@ -67,7 +67,6 @@ class Fleet:
         self._delay = np.zeros(n, np.int64)  # control periods
         self._late: Array | None = None  # aims of the last periods (SLOTS, 4, n), once a vehicle needs them
         self._air = np.zeros((len(Air._fields), n), dtype)
-        self._here = Air._make(self._air)  # the same numbers
         self._keys = np.zeros(n, np.uint64)
         self._wind = np.zeros((4, n), dtype)  # states of the wind's processes
         self._keep, self._kick = np.zeros((4, n), dtype), np.zeros((4, n), dtype)
@@ -99,12 +98,29 @@ class Fleet:
             if payload["attach"] == 0:
                 change(loaded)
             else:
-                events.append(_Event(round(payload["attach"] / GRID), "payload attached", partial(change, loaded)))
-            events.append(_Event(round(payload["drop"] / GRID), "payload dropped", partial(change, bare)))
+                events.append(_Event(round(payload["attach"] / GRID), (ATTACHED,), partial(change, loaded)))
+            events.append(_Event(round(payload["drop"] / GRID), (DROPPED,), partial(change, bare)))
         self.bodies.place(vehicle, task.start(realised))
         events.sort(key=lambda event: event.step)
         self._agenda[vehicle] = events[::-1]
         self._await(vehicle)
+
+    def rest(self, vehicle: int) -> None:
+        """Let nothing more happen to a vehicle until it begins anew."""
+        self._agenda[vehicle] = []
+        self._await(vehicle)
+
+    def motion(self, vehicles: NDArray[np.int64]) -> list[Array]:
+        """What of some vehicles changes from step to step, to be given back to `stop`."""
+        return [part[..., vehicles] for part in self._moving()]
+
+    def stop(self, vehicles: NDArray[np.int64], motion: list[Array]) -> None:
+        """Undo how some vehicles have moved."""
+        for part, before in zip(self._moving(), motion, strict=True):
+            part[..., vehicles] = before
+
+    def _moving(self) -> tuple[Array, ...]:
+        return *self.bodies.motion(), self.thrusts, self.wrenches
 
     def advance(self, commands: Array) -> dict[int, list[str]]:
         """Let wrenches [u1, u2, u3, u4] (4, n) (N, Nm) act for one control period; returns events by vehicle."""
@@ -163,7 +179,7 @@ class Fleet:
         """Velocity of the air at each vehicle's place during this step (3, n) (m/s), world axes."""
         (x, y, z), (ambient_x, ambient_y, ambient_z, turbulence) = origin, self._wind
         states = ambient_x, ambient_y, ambient_z, turbulence
-        wind = np.stack(velocity(self._here, states, (x, y, z), np.exp))
+        wind = np.stack(velocity(Air._make(self._air), states, (x, y, z), np.exp))
         self._wind = advance(self._keep, self._kick, self._wind, noise)
         return wind
 
@@ -195,12 +211,12 @@ class Fleet:
         for slot, push in enumerate(pushes):
             self._places[slot, :, vehicle] = _SITES[push.site]
             first, last = push.first // PARTS, push.end // PARTS
-            texts = {first: f"push {slot} begins", last: f"push {slot} ends"}
             for step in sorted({first, first + 1, last, last + 1}):
                 covered = min(push.end, (step + 1) * PARTS) - max(push.first, step * PARTS)
                 force = np.multiply(push.force, max(0, covered) / PARTS)
                 act = partial(self._push, slot, vehicle, force)
-                events.append(_Event(step, texts.get(step, ""), act))
+                told = (PUSH_BEGINS,) * (step == first) + (PUSH_ENDS,) * (step == last)
+                events.append(_Event(step, told, act))
         return events
 
     def _push(self, slot: int, vehicle: int, force: Array) -> None:
@@ -210,7 +226,7 @@ class Fleet:
         return [
             _Event(
                 round(loss["start"] / GRID),
-                "",
+                (),
                 partial(self._lose, vehicle, robot.ROTORS.index(loss["joint"]), loss["factor"]),
             )
             for loss in realised.get("actuator_loss", ())
@@ -226,8 +242,8 @@ class Fleet:
             while agenda and self._begun[vehicle] + agenda[-1].step <= self._step:
                 event = agenda.pop()
                 event.act()
-                if event.text:
-                    told.setdefault(vehicle, []).append(event.text)
+                if event.told:
+                    told.setdefault(vehicle, []).extend(event.told)
             self._await(vehicle)
 
     def _await(self, vehicle: int) -> None:

@@ -18,6 +18,7 @@ from artde_gym.sim.camera import Camera
 from artde_gym.sim.engine import Engine
 
 RATE = 30.0  # pictures a simulated second
+MAX_FPS, SLOW_FPS = 100.0, 50.0  # frames/s: what a video can have, and has in slow motion where steps are shorter
 SIZES = (16, 4096)  # pixels, of a picture's sides
 PUSH = (196, 22, 60)
 PATH = (120, 130, 150)
@@ -55,7 +56,7 @@ class View:
         self._engine, self.camera = engine, camera
         self._share, self._slack = share, slack
         rate = 1.0 / control_period
-        self.metadata = {"render_fps": round(rate) if abs(rate - round(rate)) < 1e-9 else rate}
+        self.metadata = {"render_fps": SLOW_FPS if rate > MAX_FPS + 1e-9 else rate}
         self._last: tuple[Any, NDArray[np.uint8]] | None = None
 
     def reset(self) -> None:
@@ -96,7 +97,7 @@ class View:
             head = f"{self.caption}   t = {time_s:.2f} s" if self.caption else f"t = {time_s:.2f} s"
             _write(drawn, [head, words] if words else [head])
             self._last = key, np.array(drawn)
-        return self._last[1]
+        return self._last[1].copy()
 
     def following(self, home: Vector) -> Camera:
         """Where the camera is now."""

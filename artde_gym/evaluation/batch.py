@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -21,6 +20,7 @@ from artde_gym.evaluation.rollout import (
     stack,
     traces_of,
 )
+from artde_gym.info import fall_reason
 
 BLOCK = 4096  # samples of all episodes together that metrics take in at once: a call has its price
 
@@ -57,7 +57,7 @@ def run_batch(
     split = env.observation_layout.split
 
     observation, info = env.reset(seed=list(seeds))
-    disturbances = copy.deepcopy(list(info["disturbances"]))  # what is kept is a copy: policies write into theirs
+    disturbances = env.sampled_disturbances
     metrics = metrics_for(env, disturbances, phases)
     live = np.ones(len(seeds), dtype=np.bool_)
     steps, total = np.zeros(len(seeds), dtype=np.int64), np.zeros(len(seeds))
@@ -91,7 +91,7 @@ def run_batch(
         if ended.any():
             metrics.add(k, split(observation[None]), None, ended)  # nothing is decided there any more
             steps[ended] = k
-            reasons |= {int(i): info["fall_reason"][i] for i in np.flatnonzero(live & terminated)}
+            reasons |= {int(i): fall_reason(info, int(i)) for i in np.flatnonzero(live & terminated)}
             live = live & ~ended
         if on_progress is not None and k % report_every == 0:
             on_progress(k * period)

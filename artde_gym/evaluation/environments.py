@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import gymnasium as gym
 from gymnasium.envs.registration import load_env_creator
+from gymnasium.vector import AutoresetMode
 
 from artde_gym.errors import OptionError, among
 from artde_gym.kit import ROBOTS
@@ -79,8 +80,9 @@ def vector(env_id: str, arguments: str, size: int) -> Any:
         OptionError: as of `single`, or for an environment that has no vector of its own.
     """
     given = _checked(env_id, arguments, "batch")
-    if "autoreset" in arguments_of(env_id, "batch"):
-        given = {"autoreset": False, **given}
+    creator: Any = load_env_creator(_entry_point(env_id, "batch"))
+    if hasattr(creator, "own_engine"):
+        given = {"engine": creator.own_engine, "autoreset_mode": AutoresetMode.DISABLED, **given}
     return gym.make_vec(env_id, size, vectorization_mode="vector_entry_point", **given)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artde_gym.evaluation.metrics import Metrics, Span, events_of, payload_of
+from artde_gym.info import fall_reason
 
 Array = NDArray[Any]
 
@@ -59,8 +59,8 @@ def run_episode(
     looks = diagnosed_every(plant, stride)
 
     observation, info = env.reset(seed=seed, options=options)
-    disturbances = copy.deepcopy(info["disturbances"])  # what is kept is a copy: policies write into theirs
-    observations, diagnostics, told = [np.array(observation)], [], [_told(plant, info)]
+    disturbances = plant.sampled_disturbances
+    observations, diagnostics, told = [np.array(observation)], [], [_told(plant, info)]  # copies: policies write
     state, episode_start = None, True
     terminated = truncated = False
     total = 0.0
@@ -84,7 +84,7 @@ def run_episode(
     last = len(observations) - 1
     metrics.add(0, _part(fields, np.s_[:last, None]), _part(inside, np.s_[:, None]))
     metrics.add(last, _part(fields, np.s_[last:, None]), None)  # nothing was decided there any more
-    reason = info.get("fall_reason", "") if terminated else None
+    reason = fall_reason(info) if terminated else None
     row = row_of(reason, info["time_s"], total, metrics.rows(np.array([bool(terminated)]))[0], disturbances)
     kept = slice(None, None, stride // looks)
     seen = _part(fields, slice(None, None, stride)) | stack(told)

@@ -13,7 +13,7 @@ import math
 import tempfile
 import weakref
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pybullet_data
@@ -40,6 +40,14 @@ HOLD_TORQUE = 100.0  # Nm, of the motors that hold joints which nobody actuates
 _ORIGIN = (0.0, 0.0, 0.0)
 _NO_JOINTS = np.zeros(0)
 _NO_JOINTS.flags.writeable = False
+
+
+class _Snapshot(NamedTuple):
+    """A state of the world by Bullet's handle, the friction of its contacts, and the same for another process."""
+
+    handle: int
+    friction: float
+    world: bytes
 
 
 class BulletEngine:
@@ -76,7 +84,9 @@ class BulletEngine:
         self._shadow = Shadow(spec)
         self._mass_factor = 1.0
         self._friction = math.nan
-        self._friction_at: dict[int, float] = {}  # of the contacts in each snapshot
+        self._gravity: Vector = (0.0, 0.0, -9.81)
+        self._snapshots: list[_Snapshot] = []
+        self._ballast: tuple[float, Vector] = (0.0, _ORIGIN)  # mass and place of the payload
         self._payload: int | None = None  # body
         self._holder: int | None = None  # constraint
 
@@ -146,13 +156,56 @@ class BulletEngine:
 
     def snapshot(self) -> int:
         handle = bullet.saveState(physicsClientId=self._client)
-        self._friction_at[handle] = self._friction
-        return handle
+        self._snapshots.append(_Snapshot(handle, self._friction, self._world()))
+        return len(self._snapshots) - 1
 
     def restore(self, snapshot: int) -> None:
         self._remove_payload()  # Bullet restores only a world with the same bodies
-        self._set_foot_friction(self._friction_at[snapshot])
-        bullet.restoreState(snapshot, physicsClientId=self._client)
+        saved = self._snapshots[snapshot]
+        self._set_foot_friction(saved.friction)
+        bullet.restoreState(saved.handle, physicsClientId=self._client)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All that a copy needs: an equal world in a client of its own, which steps as this one would, bit for bit."""
+        payload = None if self._payload is None else (*self._ballast, self._holder is not None)
+        return {
+            "built": (self.spec, self.time_step),
+            "snapshots": [(saved.friction, saved.world) for saved in self._snapshots],
+            "set": (self._gravity, self._mass_factor, self._friction),
+            "payload": payload,
+            "world": self._world(),
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(*state["built"])
+        for friction, world in state["snapshots"]:
+            self._load(friction, world)
+            self.snapshot()
+        gravity, factor, friction = state["set"]
+        self.set_gravity(gravity)
+        self.scale_masses(factor)
+        if state["payload"] is not None:
+            mass, position, held = state["payload"]
+            self.attach_payload(mass, position)
+            if not held:
+                self.release_payload()
+        self._load(friction, state["world"])
+
+    def _world(self) -> bytes:
+        """Positions, velocities and contacts of all bodies, as Bullet writes them to files."""
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "world.bullet"
+            bullet.saveBullet(str(file), physicsClientId=self._client)
+            return file.read_bytes()
+
+    def _load(self, friction: float, world: bytes) -> None:
+        """Bring about what `_world` wrote, in a world with the same bodies."""
+        if not math.isnan(friction):
+            self._set_foot_friction(friction)
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "world.bullet"
+            file.write_bytes(world)
+            bullet.restoreState(fileName=str(file), physicsClientId=self._client)
 
     def read(self) -> State:
         client = self._client
@@ -212,6 +265,7 @@ class BulletEngine:
 
     def set_gravity(self, gravity: Vector) -> None:
         bullet.setGravity(*gravity, physicsClientId=self._client)
+        self._gravity = gravity
 
     def scale_masses(self, factor: float) -> None:
         if factor == self._mass_factor:
@@ -262,7 +316,7 @@ class BulletEngine:
         velocity, spin = bullet.getBaseVelocity(self._robot, **client)
         velocity = np.asarray(velocity) + np.cross(spin, point - center)
         bullet.resetBaseVelocity(body, velocity.tolist(), spin, **client)
-        self._payload, self._holder = body, joint
+        self._payload, self._holder, self._ballast = body, joint, (mass, position)
 
     def release_payload(self) -> None:
         if self._holder is not None:

@@ -80,6 +80,8 @@ class Engine(World, Protocol):
 
     Its parts pass through each other, unless the spec says that its feet do not.
 
+    A copy (`copy.deepcopy`, `pickle`) is a world of its own that goes on as the copied one would, bit for bit.
+
     Joints that the spec does not actuate are held at zero. Gravity and masses stay as they were set, whatever is placed
     or restored afterwards; they start at 9.81 m/s^2 downward and at the spec's. Friction has no default: set it.
     """

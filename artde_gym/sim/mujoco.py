@@ -71,15 +71,38 @@ class MujocoEngine(MujocoWorld):
         self._q[self._joints] = q
 
     def snapshot(self) -> int:
-        state = np.empty(mj.mj_stateSize(self._model, STATE))
-        mj.mj_getState(self._model, self._data, state, STATE)
-        self._snapshots.append((state, self._forces.copy(), self._model.pair_friction.copy()))
+        self._snapshots.append((self._saved(), self._forces.copy(), self._model.pair_friction.copy()))
         return len(self._snapshots) - 1
 
     def restore(self, snapshot: int) -> None:
         self._remove_payload()
         state, self._forces[:], self._model.pair_friction[:] = self._snapshots[snapshot]
         mj.mj_setState(self._model, self._data, state, STATE)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All that a copy needs: an equal world of its own, which steps as this one would, bit for bit."""
+        return {
+            "built": (self.spec, self.time_step),
+            "renders": self._canvas is not None,
+            "snapshots": self._snapshots,
+            "set": self.settings(),
+            "fall": self._fall,
+            "pushed": self._pushed,
+            "state": self._saved(),
+            "forces": self._forces.copy(),
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(*state["built"], renders=state["renders"])
+        self.set_up(state["set"])
+        self._snapshots, self._fall, self._pushed = state["snapshots"], state["fall"], state["pushed"]
+        mj.mj_setState(self._model, self._data, state["state"], STATE)
+        self._forces[:] = state["forces"]
+
+    def _saved(self) -> Array:
+        state = np.empty(mj.mj_stateSize(self._model, STATE))
+        mj.mj_getState(self._model, self._data, state, STATE)
+        return state
 
     def read(self) -> State:
         x, y, z, w, i, j, k = self._pose.tolist()

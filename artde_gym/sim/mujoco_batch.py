@@ -52,6 +52,7 @@ class MujocoBatch:
     """
 
     def __init__(self, spec: RobotSpec, n: int, time_step: float, threads: int) -> None:
+        self._built = (spec, n, time_step, threads)
         self._blueprint = blueprint = Blueprint(spec, time_step)
         joints = blueprint.joints
         if not isinstance(joints, slice):
@@ -68,6 +69,24 @@ class MujocoBatch:
         self._friction = fields[FIELDS.index("pair_friction")]
         self.worlds = [_Row(blueprint, Fields(*(field[i] for field in fields)), self, i) for i in range(n)]
         self._snapshots: list[tuple[Array, Array, Array]] = []
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All that a copy needs: equal worlds of its own, which step as these would, bit for bit."""
+        return {
+            "built": self._built,
+            "snapshots": self._snapshots,
+            "set": [world.settings() for world in self.worlds],
+            "state": self._batch.state.copy(),
+            "forces": self._forces.copy(),
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(*state["built"])
+        for world, settings in zip(self.worlds, state["set"], strict=True):
+            world.set_up(settings)
+        self._snapshots = state["snapshots"]
+        self._batch.state[:] = state["state"]
+        self._forces[:] = state["forces"]
 
     def place(self, world: int, position: Vector, q: Array) -> None:
         """Put the upright robot of a world at `position` (m), the joints at `q`, all at rest, without a payload."""

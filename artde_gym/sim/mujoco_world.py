@@ -119,6 +119,22 @@ class MujocoWorld(abc.ABC):
         fields.dof_armature[:] = factor * nominal.armature
         self.masses_changed()
 
+    def settings(self) -> dict[str, Any]:
+        """What of this world differs from the blueprint, to be given to `set_up`."""
+        fields = self._fields
+        mass = float(fields.body_mass[self._blueprint.payload])
+        friction, gravity = fields.pair_friction.copy(), fields.gravity.copy()
+        return {"factor": self._mass_factor, "payload": (mass, self.held), "friction": friction, "gravity": gravity}
+
+    def set_up(self, settings: dict[str, Any]) -> None:
+        """Make this world as another one was."""
+        self.scale_masses(settings["factor"])
+        mass, place = settings["payload"]
+        if place is not None:
+            MujocoWorld.attach_payload(self, mass, place)
+        self._fields.pair_friction[:] = settings["friction"]
+        self._fields.gravity[:] = settings["gravity"]
+
     def attach_payload(self, mass: float, position: Vector) -> None:
         self.held = position
         self._fields.body_pos[self._blueprint.payload] = position

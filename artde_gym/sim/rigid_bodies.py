@@ -89,6 +89,10 @@ class RigidBodies:
         self.rates[:, body] = self.com_velocity[:, body] = self._acceleration[:, body] = 0.0
         self.com[:, body] = np.add(origin, self._arm[:, body])
 
+    def motion(self) -> tuple[Array, ...]:
+        """The arrays that a step changes, bodies along the last axis."""
+        return self.com, self.com_velocity, self.quat_xyzw, self.rot, self.rates, self._acceleration
+
     def origin(self, bodies: int | slice = ALL) -> Array:
         """Positions of the bodies' origins (3, n) (m), world axes."""
         return self.com[:, bodies] - times(self.rot[..., bodies], self._arm[:, bodies])

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from artde_gym.evaluation.environments import drawing
 from artde_gym.evaluation.evaluate import policy_for
 from artde_gym.evaluation.rollout import Policy
+from artde_gym.info import fall_reason
 from artde_gym.registration import ControllerSpec
 
 
@@ -56,7 +57,7 @@ def shots(
                 action, state = predict(observation, state=state, episode_start=first, deterministic=True)
                 observation, _, terminated, truncated, info = env.step(action)
                 first, over = False, terminated or truncated
-            reason = info.get("fall_reason", "")
+            reason = fall_reason(info)
             yield Shot(info["time_s"], env.render(), over, reason)
             if over:
                 return

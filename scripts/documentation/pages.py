@@ -30,7 +30,7 @@ policy = controllers.make("artde", env)
 observation, info = env.reset(seed=0)
 action, state = policy.predict(observation)
 observation, reward, terminated, truncated, info = env.step(action)
-print(info["reward_terms"])
+print(info["reward_alive"], info["disturbance.payload.mass"])
 ```
 """
 

@@ -193,7 +193,7 @@ def test_chunks_cover_all_evenly() -> None:
         ({"env_id": "BipedPush-v0", "env_kwargs": {"threads": 0}}, OptionError, ["threads", "0", ">= 1"]),
         ({"backend": "bach"}, OptionError, ["backend", "bach", "did you mean 'batch'"]),
         ({"traced": -1}, OptionError, ["traced", "-1"]),
-        ({"env_kwargs": {"engine": "bullet"}}, OptionError, ["engine", "dtype"]),
+        ({"env_kwargs": {"engine": "bullet"}}, OptionError, ["engine", "bullet", "numpy"]),
         ({"env_kwargs": {"num_envs": 3}}, OptionError, ["num_envs", "duration"]),
         ({"env_kwargs": {"dtype": "float16"}}, OptionError, ["dtype", "float16"]),
         ({"disturbances": {"wind": -1.0}}, DisturbanceError, ["wind.scale", "-1"]),

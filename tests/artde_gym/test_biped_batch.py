@@ -48,11 +48,25 @@ VARIED: dict[str, Any] = {
 
 
 def make(num_envs: int, **kwargs: Any) -> Any:
-    return gym.make_vec(ID, num_envs=num_envs, vectorization_mode="vector_entry_point", **kwargs)
+    return gym.make_vec(
+        ID, num_envs=num_envs, vectorization_mode="vector_entry_point", **{"engine": "mujoco", **kwargs}
+    )
+
+
+def sampled(env: Any, **kwargs: Any) -> Any:
+    """Reset, and tell what was sampled."""
+    env.reset(**kwargs)
+    return env.unwrapped.sampled_disturbances
 
 
 def single(**kwargs: Any) -> Any:
     return gym.make(ID, disable_env_checker=True, engine="mujoco", **kwargs).unwrapped
+
+
+def told(info: dict[str, Any], robot: int | None = None) -> dict[str, Any]:
+    """All of an info, or of one robot's share in it, to be compared."""
+    own = {name: value for name, value in info.items() if name[0] != "_"}
+    return {name: np.asarray(value if robot is None else value[robot]).tolist() for name, value in own.items()}
 
 
 def walked_alone(seed: int, steps: int, law: str = "tde", **kwargs: Any) -> list[Any]:
@@ -60,20 +74,19 @@ def walked_alone(seed: int, steps: int, law: str = "tde", **kwargs: Any) -> list
     env = single(**kwargs)
     policy, state, start = controllers.make(law, env), None, True
     observation, info = env.reset(seed=seed)
-    log: list[Any] = [(observation.tobytes(), repr(info["disturbances"]), info["foot_loads"])]
+    log: list[Any] = [(observation.tobytes(), told(info), env.sampled_disturbances)]
     over = False
     for _ in range(steps):
         action, state = policy.predict(observation, state, episode_start=start)
         if over:
             observation, info = env.reset()
-            over, entry = False, (observation.tobytes(), 0.0, False, False, repr(info["disturbances"]), None, None)
+            over, entry = False, (observation.tobytes(), 0.0, False, False)
         else:
             observation, reward, terminated, truncated, info = env.step(action)
             over = terminated or truncated
-            told = info.get("events"), info.get("fall_reason")
-            entry = (observation.tobytes(), reward, terminated, truncated, repr(info["reward_terms"]), *told)
+            entry = (observation.tobytes(), reward, terminated, truncated)
         start = over
-        log.append((*entry, info["time_s"], info["foot_loads"]))
+        log.append((*entry, told(info), env.sampled_disturbances))
     env.close()
     return log
 
@@ -83,21 +96,16 @@ def walked_together(env: Any, seeds: Any, steps: int, law: str = "tde") -> list[
     policy, state, start = controllers.make(law, env), None, None
     observations, info = env.reset(seed=seeds)
     logs: list[list[Any]] = [
-        [(own.tobytes(), repr(info["disturbances"][i]), tuple(info["foot_loads"][i].tolist()))]
-        for i, own in enumerate(observations)
+        [(own.tobytes(), told(info, i), env.sampled_disturbances[i])] for i, own in enumerate(observations)
     ]
     for _ in range(steps):
         actions, state = policy.predict(observations, state, episode_start=start)
         observations, rewards, terminated, truncated, info = env.step(actions)
         start = terminated | truncated
         for i, log in enumerate(logs):
-            terms = {name: float(info["reward_terms"][name][i]) for name in env.reward_scales}
-            began = "disturbances" in info and info["_disturbances"][i]
-            assert info["_reward_terms"][i] != began
-            said = [info[name][i] if name in info else None for name in ("events", "fall_reason")]
-            ends = bool(terminated[i]), bool(truncated[i]), repr(info["disturbances"][i] if began else terms)
-            after = info["time_s"][i], tuple(info["foot_loads"][i].tolist())
-            log.append((observations[i].tobytes(), float(rewards[i]), *ends, *said, *after))
+            ends = bool(terminated[i]), bool(truncated[i])
+            own = told(info, i), env.sampled_disturbances[i]
+            log.append((observations[i].tobytes(), float(rewards[i]), *ends, *own))
     return logs
 
 
@@ -160,15 +168,14 @@ def test_same_seed_same_bits_after_other_walks() -> None:
 
 def test_generators_go_on_without_a_seed_as_those_of_one_environment() -> None:
     env, alone = make(2, disturbances=PUSHED), single(disturbances=PUSHED)
-    first = env.reset(seed=[1, 2])[1]["disturbances"]
-    second = env.reset()[1]["disturbances"]
+    first = sampled(env, seed=[1, 2])
+    second = sampled(env)
     assert second[1] != first[1]
     alone.reset(seed=2)
-    info = alone.reset()[1]
-    assert info["disturbances"] == second[1]
-    info = env.reset(seed=[None, 2])[1]
-    assert info["disturbances"][1] == first[1]
-    assert info["disturbances"][0] not in (first[0], second[0])
+    assert sampled(alone) == second[1]
+    third = sampled(env, seed=[None, 2])
+    assert third[1] == first[1]
+    assert third[0] not in (first[0], second[0])
     assert list(env.np_random_seed)[1] == 2
 
 
@@ -184,11 +191,11 @@ def test_it_is_made_by_the_vector_entry_point() -> None:
     assert env.observation_space.shape == (3, alone.observation_space.shape[0])
     for name in ("robot_name", "control_period", "nominal_robot", "observation_layout", "action_layout", "tracking"):
         assert env.get_attr(name) == (getattr(alone, name),) * 3
-    assert make(2, autoreset=False).metadata["autoreset_mode"] is AutoresetMode.DISABLED
+    assert make(2, autoreset_mode="Disabled").metadata["autoreset_mode"] is AutoresetMode.DISABLED
     assert "Actions" not in str(BipedPushVectorEnv.__doc__)
     for words in ("{", "}"):
         assert f"{words}shared" not in str(BipedPushVectorEnv.__doc__)
-    for word in ("q1..q6", "autoreset", "threads", "reset_mask", "payload of 1.3 kg and the two pushes"):
+    for word in ("q1..q6", "autoreset_mode", "threads", "reset_mask", "payload of 1.3 kg and the two pushes"):
         assert word in str(BipedPushVectorEnv.__doc__)
     env.close()
 
@@ -197,7 +204,7 @@ def test_spec_survives_json() -> None:
     env: Any = make(3, disturbances=PUSHED, control_period=0.002, threads=2)
     again: Any = gym.make_vec(EnvSpec.from_json(env.spec.to_json()))
     assert (again.num_envs, again.control_period) == (3, 0.002)
-    first, second = (each.reset(seed=3)[1]["disturbances"].tolist() for each in (env, again))
+    first, second = (sampled(each, seed=3) for each in (env, again))
     assert first == second
 
 
@@ -231,8 +238,8 @@ def test_others_do_not_notice_a_fall() -> None:
 
 
 def test_without_autoreset_a_walk_that_is_over_waits() -> None:
-    env = make(3, autoreset=False, disturbances={**VARIED, "payload": 1.0}, duration=0.1)
-    other = make(3, autoreset=False, disturbances={**VARIED, "payload": 1.0}, duration=0.1)
+    env = make(3, autoreset_mode="Disabled", disturbances={**VARIED, "payload": 1.0}, duration=0.1)
+    other = make(3, autoreset_mode=AutoresetMode.DISABLED, disturbances={**VARIED, "payload": 1.0}, duration=0.1)
     truncated = np.zeros(3, np.bool_)
     env.reset(seed=[1, 2, 3])
     other.reset(seed=[1, 2, 3])
@@ -242,7 +249,7 @@ def test_without_autoreset_a_walk_that_is_over_waits() -> None:
         other.step(still)
     mask = np.array([False, True, False])
     observations, info = env.reset(options={"reset_mask": mask})
-    assert np.array_equal(info["_disturbances"], mask)
+    assert np.array_equal(info["_time_s"], mask)
     for _ in range(50):
         observations, _, terminated, truncated, _ = env.step(still)
         theirs, *_ = other.step(still)
@@ -254,7 +261,6 @@ def test_without_autoreset_a_walk_that_is_over_waits() -> None:
         assert np.array_equal(rewards[[0, 2]], [0.0, 0.0])
         assert not (terminated | truncated)[[0, 2]].any()
     assert truncated[1]
-    assert "disturbances" not in info
     assert np.array_equal(info["time_s"], [0.1, 0.1, 0.1])
 
 
@@ -267,9 +273,10 @@ def test_reset_mask_resets_some() -> None:
     mask = np.array([False, True, False])
     a, info = env.reset(seed=[5, 6, 7], options={"reset_mask": mask})
     assert a[[0, 2]].tobytes() == b[[0, 2]].tobytes()
-    assert info["disturbances"][0] is None
-    fresh, alone = single(disturbances=PUSHED).reset(seed=6)
-    assert info["disturbances"][1] == alone["disturbances"]
+    assert all(np.array_equal(values, mask) for name, values in info.items() if name[0] == "_")
+    alone = single(disturbances=PUSHED)
+    fresh, _ = alone.reset(seed=6)
+    assert env.sampled_disturbances[1] == alone.sampled_disturbances
     assert a[1].tobytes() == fresh.tobytes()
     for _ in range(20):
         a, b = env.step(still)[0], other.step(still)[0]
@@ -278,7 +285,7 @@ def test_reset_mask_resets_some() -> None:
 
 def test_reset_takes_scenarios() -> None:
     env = make(2, control_period=0.004)
-    drawn = env.reset(seed=0, options={"scenario": "S3-L4"})[1]["disturbances"]
+    drawn = sampled(env, seed=0, options={"scenario": "S3-L4"})
     assert len(drawn[0]["push"]) == len(drawn[1]["push"]) > 1
     with pytest.raises(OptionError, match=r"control_period of this environment is 0\.001; allowed: 0\.004"):
         make(1).reset(options={"scenario": "S3-L4"})
@@ -289,7 +296,7 @@ def test_reset_takes_scenarios() -> None:
     [
         ({"num_envs": 0}, ["num_envs", "0", ">= 1"]),
         ({"num_envs": 2.5}, ["num_envs", "2.5"]),
-        ({"engine": "bullet"}, ["engine", "bullet", "'mujoco'", "no batches"]),
+        ({"engine": "bullet"}, ["engine", "bullet", "'mujoco'", "sync"]),
         ({"engine": "ode"}, ["engine", "ode", "'mujoco'"]),
         ({"threads": 0}, ["threads", "0", ">= 1"]),
         ({"threads": True}, ["threads", "True"]),
@@ -301,7 +308,7 @@ def test_reset_takes_scenarios() -> None:
 )
 def test_bad_arguments_name_field_value_and_what_is_allowed(kwargs: dict[str, Any], words: list[str]) -> None:
     with pytest.raises(ArtdeGymError) as caught:
-        BipedPushVectorEnv(**{"num_envs": 1, **kwargs})
+        BipedPushVectorEnv(**{"num_envs": 1, "engine": "mujoco", **kwargs})
     for word in (*words, "allowed"):
         assert word in str(caught.value)
 

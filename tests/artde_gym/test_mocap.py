@@ -21,7 +21,7 @@ WINDY: dict[str, Any] = {"wind": 2.0}
 
 def seen_and_true(pilot: Pilot, steps: int, num_envs: int = 32, **kwargs: Any) -> tuple[np.ndarray, np.ndarray]:
     """Observations of vehicles in the wind under motion capture, and their true states; (steps, n, 41)."""
-    env: Any = gym.make_vec(ID, num_envs=num_envs, disturbances=WINDY, measurement="mocap", **kwargs)
+    env: Any = gym.make_vec(ID, num_envs=num_envs, engine="numpy", disturbances=WINDY, measurement="mocap", **kwargs)
     observation, _ = env.reset(seed=0)
     seen, true = [observation], [env._truth()]
     for _ in range(steps):
@@ -101,7 +101,7 @@ def test_frames_come_sixty_times_a_second(period: float, monkeypatch: pytest.Mon
 def test_one_vehicle_sees_what_the_same_one_among_many_sees(pilot: Pilot) -> None:
     arguments: dict[str, Any] = {"disturbances": WINDY, "measurement": "mocap"}
     alone: Any = gym.make(ID, disable_env_checker=True, **arguments)
-    many: Any = gym.make_vec(ID, num_envs=2, **arguments)
+    many: Any = gym.make_vec(ID, num_envs=2, engine="numpy", **arguments)
     a, b = alone.reset(seed=3)[0], many.reset(seed=[9, 3])[0][1]
     for _ in range(60):
         action = pilot(a)

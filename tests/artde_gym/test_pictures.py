@@ -155,7 +155,7 @@ def test_a_push_is_an_arrow_onto_its_point_while_it_acts(drawing_engine: EngineN
 
 def test_a_new_picture_thirty_times_a_second_and_in_the_end() -> None:
     env = make(duration=0.5, render_mode="rgb_array", width=64, height=48, disturbances={})
-    assert env.metadata["render_fps"] == 1000
+    assert env.metadata["render_fps"] == 50
     env.reset(seed=0)
     pictures, over = [env.render()], False
     while not over:

@@ -164,7 +164,7 @@ def test_a_shipped_policy_belongs_to_an_environment(env):
         controllers.make("tde+balance", env)
     with pytest.raises(UnknownNameError, match="environment of a trained policy is ''"):
         controllers.make("tde+ppo", type(env.unwrapped)())  # nobody gave it an id
-    vector = gym.make_vec("QuadInfinity-Payload-v0", 2, vectorization_mode="vector_entry_point")
+    vector = gym.make_vec("QuadInfinity-Payload-v0", 2, vectorization_mode="vector_entry_point", engine="numpy")
     assert controllers.make("tde+ppo", vector).name == "tde+ppo"
 
 

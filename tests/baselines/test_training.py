@@ -35,7 +35,7 @@ GALE = {"wind": 2.0, "ground_effect": 1.0}
 
 
 def batch(count: int, **kwargs: Any) -> Any:
-    return gym.make_vec(QUADROTOR, count, vectorization_mode="vector_entry_point", **kwargs)
+    return gym.make_vec(QUADROTOR, count, vectorization_mode="vector_entry_point", engine="numpy", **kwargs)
 
 
 def small(algo: str = "ppo", **more: Any) -> Training:

@@ -14,6 +14,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 import artde_gym  # noqa: F401  # registers the environment
 import controllers
 from artde_gym.errors import UnknownNameError
+from artde_gym.info import fall_reason
 from artde_gym.robots.q450.task import OBSERVATION
 from controllers.laws.errors import GainError
 
@@ -218,7 +219,7 @@ def rms(fields: dict[str, np.ndarray]) -> np.ndarray:
 def test_every_controller_flies_the_path(env, name):
     limit = 0.03 if name in ("tde", "atde", "artde", "artde-robust") else 0.06
     fields, info, _ = flown(env, controllers.make(name, env))
-    assert "fall_reason" not in info
+    assert not fall_reason(info)
     assert info["time_s"] == pytest.approx(70.0, abs=0.02)
     assert rms(fields).max() < limit
 
@@ -228,7 +229,7 @@ def test_tuned_gains_fly_the_first_loop_better_than_the_default(env, name):
     errors = []
     for options in ({}, {"preset": "tuned"}):
         fields, info, _ = flown(env, controllers.make(name, env, **options), 20.0)
-        assert "fall_reason" not in info
+        assert not fall_reason(info)
         errors.append(np.linalg.norm(rms(fields)))
     assert errors[1] < errors[0]
 
@@ -237,7 +238,7 @@ def test_tuned_gains_fly_the_first_loop_better_than_the_default(env, name):
 @pytest.mark.parametrize("options", [{"remembered_force": "commanded"}, {"attitude_error": "printed"}])
 def test_two_readings_of_the_thesis_crash(env, name, options):
     _, info, _ = flown(env, controllers.make(name, env, **options))
-    assert info["fall_reason"] in ("ground", "inverted", "bounds")
+    assert fall_reason(info) in ("ground", "inverted", "bounds")
     assert info["time_s"] < (3.0 if "attitude_error" in options else 33.0)
 
 
@@ -247,7 +248,7 @@ def test_gains_as_printed_drift_in_the_wind_and_bounded_ones_do_not():
         for name in ("artde", "artde-robust"):
             policy = controllers.make(name, env)
             _, info, state = flown(env, policy)
-            assert "fall_reason" not in info
+            assert not fall_reason(info)
             grown[name] = policy.diagnostics(state)["beta_0_q"]
     assert grown["artde-robust"] < 0.02 < 0.05 < grown["artde"]
 

@@ -12,6 +12,7 @@ import numpy as np
 from artde_gym.arguments import flag, steps_per_period, word
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
+from artde_gym.disturbances.numeric import Words
 from artde_gym.layout import Field, Layout
 from artde_gym.multibody.dynamics import GRAVITY
 from artde_gym.multibody.spec import RobotSpec, Vector
@@ -107,7 +108,7 @@ hip pitch, knee, ankle pitch, ankle roll. Held for one control period; clipped t
 `tau_applied` is what really acted, after saturation: the time-delay estimate needs just that.
 
 ## Reward
-Over a control period L, L times the sum of scale x term; each term is in `info["reward_terms"]`:
+Over a control period L, L times the sum of scale x term; each term is in `info`, as `reward_alive` and so on:
 
 | term | scale | value |
 |---|---|---|
@@ -123,9 +124,9 @@ A walk of 58 s without an error earns a little under 203.
 The robot stands on both feet in the pattern's first pose, at rest, in balance with its payload.
 
 ## End
-*Terminated* when it has fallen: tilt above 35 degrees (`info["fall_reason"] == "tilt"`), base below 0.25 m
-(`"height"`), or joint speeds whose norm passes 200 rad/s (`"speed"`: it has diverged). *Truncated* at the end of the
-walk.
+*Terminated* when it has fallen: tilt above 35 degrees (`info["fell_tilt"]`), base below 0.25 m
+(`fell_height`), or joint speeds whose norm passes 200 rad/s (`fell_speed`: it has diverged). *Truncated* at the end of
+the walk.
 
 ## Arguments
 | name | default | allowed | meaning |
@@ -155,6 +156,7 @@ class Walk:
         position: of the base at the start (m), the robot standing upright.
         stand: joint torques (12,) (Nm) that balance the pattern's first pose.
         damping: of the joints while the robot settles (Nm s/rad).
+        arguments: of which it was made.
     """
 
     nominal_robot: RobotSpec
@@ -165,6 +167,7 @@ class Walk:
     position: Vector
     stand: Array
     damping: float
+    arguments: tuple[Any, ...]
 
     @classmethod
     def of(
@@ -196,7 +199,14 @@ class Walk:
         stand = Supported(nominal).torque(0.5, pattern.q[0], rest, rest)
         damping = BARE_DAMPING if actuator_inertia == "none" else SETTLE_DAMPING
         place = (float(pattern.base[0, 0]), 0.0, hip_height)
-        return cls(nominal, model, pattern, substeps, plan, place, stand, damping)
+        arguments = (control_period, actuator_inertia, arms, self_collision, speed, step_duration, duration)
+        return cls(nominal, model, pattern, substeps, plan, place, stand, damping, arguments)
+
+    def __deepcopy__(self, _: dict[int, Any]) -> Walk:
+        return self  # nothing of it changes
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Walk.of, self.arguments  # a thousandth of what they make
 
     @property
     def start(self) -> Array:
@@ -212,10 +222,14 @@ class Walk:
         """The control period with which the walk ends."""
         return len(self.plan) - 1
 
+    @property
+    def words(self) -> Words:
+        """Names of sites and joints."""
+        return {"site": tuple(name for name, _, _ in self.robot.sites), "joint": self.nominal_robot.actuated}
+
     def parse(self, disturbances: Mapping[str, Any]) -> Disturbances:
         """Read disturbances of this robot."""
-        sites = [name for name, _, _ in self.robot.sites]
-        return Disturbances.parse(disturbances, sites, self.nominal_robot.actuated, self.nominal_robot.name)
+        return Disturbances.parse(disturbances, self.words["site"], self.words["joint"], self.nominal_robot.name)
 
     def set_up(self, world: World, realised: Mapping[str, Any]) -> None:
         """Give a world what was drawn for it, the payload excepted."""

@@ -12,6 +12,7 @@ import numpy as np
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.ground_effect import thrust_gain
+from artde_gym.disturbances.numeric import Words
 from artde_gym.disturbances.wind import GRID
 from artde_gym.layout import Field, Layout
 from artde_gym.multibody.dynamics import GRAVITY
@@ -129,7 +130,7 @@ The infinity-shaped path of `artde_gym.robots.q450.infinity`: loop 1 until 33 s,
 yaw 0.
 
 ## Reward
-Over a control period L, L times the sum of scale x term; each term is in `info["reward_terms"]`:
+Over a control period L, L times the sum of scale x term; each term is in `info`, as `reward_alive` and so on:
 
 | term | scale | value |
 |---|---|---|
@@ -146,9 +147,9 @@ A flight of 70 s without an error earns a little under 280.
 At rest and level at the path's start, in balance with the payload and on thrusts that have settled.
 
 ## End
-*Terminated* by a crash, with the reason in `info["fall_reason"]`: "ground" (the vehicle's origin lower than
-{GROUND_HEIGHT:g} m), "inverted" (tilt above 90 degrees) or "bounds" (x or y beyond {VOLUME:g} m, z above {VOLUME:g} m,
-or turning faster than {TUMBLING:g} rad/s). *Truncated* after `duration`.
+*Terminated* by a crash, with the reason in `info`: `fell_ground` (the vehicle's origin lower
+than {GROUND_HEIGHT:g} m), `fell_inverted` (tilt above 90 degrees) or `fell_bounds` (x or y beyond {VOLUME:g} m, z above
+{VOLUME:g} m, or turning faster than {TUMBLING:g} rad/s). *Truncated* after `duration`.
 
 ## Physics
 Vehicle of {robot.MASS:g} kg with linear drag of {robot.DRAG:g} N s/m against the air; see `artde_gym.robots.q450`. Wind
@@ -175,6 +176,7 @@ REWARD_SCALES: dict[str, float] = {
 }
 """The reward of a control period L is L times the sum of these scales times their terms."""
 FALL_REASONS = ("ground", "inverted", "bounds")
+WORDS: Words = {"site": tuple(name for name, _, _ in robot.q450().sites), "joint": robot.ROTORS}
 
 Number = TypeVar("Number", float, Array)
 Vector3 = tuple[Number, Number, Number]
@@ -213,8 +215,7 @@ def falls(position: Vector3[Number], up: Number, spin: Number) -> tuple[Any, Any
 
 def parse(disturbances: Mapping[str, Any]) -> Disturbances:
     """Read disturbances of the Q450."""
-    sites = [name for name, _, _ in robot.q450().sites]
-    return Disturbances.parse(disturbances, sites, robot.ROTORS, robot.q450().name)
+    return Disturbances.parse(disturbances, WORDS["site"], WORDS["joint"], robot.q450().name)
 
 
 def plan(duration: float, period: float) -> Array:

@@ -1,0 +1,39 @@
+"""Sampled disturbances as numbers and arrays alone, as `info` has them.
+
+`disturbance.payload.mass` is a number, `disturbance.payload.position` an array (3,). A kind that takes several entries
+has one array a parameter, an item an entry: `disturbance.push.magnitude` (entries,), `disturbance.push.direction`
+(entries, 3). A word is its position in `env.unwrapped.words`, by "site" or "joint", or among the words that the grammar
+allows; `env.unwrapped.sampled_disturbances` has the words themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from artde_gym.disturbances.kinds import KINDS, Parameter
+
+Words = Mapping[str, Sequence[str]]
+"""Names of a robot's sites and joints, by "site" and "joint"."""
+
+
+def numeric(sampled: Mapping[str, Any], words: Words) -> dict[str, Any]:
+    """Name each number, words being replaced by numbers and lists of entries by arrays."""
+    told: dict[str, Any] = {}
+    for kind, value in sampled.items():
+        for parameter in KINDS[kind].parameters:
+            told[f"disturbance.{kind}.{parameter.name}"] = (
+                np.array([_number(parameter, entry[parameter.name], words) for entry in value])
+                if KINDS[kind].repeated
+                else _number(parameter, value[parameter.name], words)
+            )
+    return told
+
+
+def _number(parameter: Parameter, value: Any, words: Words) -> Any:
+    if parameter.size == 0:
+        known = words[parameter.words] if isinstance(parameter.words, str) else parameter.words
+        return list(known).index(value)
+    return np.array(value) if parameter.size > 1 else value
