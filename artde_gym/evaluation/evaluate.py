@@ -7,7 +7,7 @@ import hashlib
 import itertools
 import json
 import pickle
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
@@ -127,10 +127,7 @@ def evaluate(
     if traced is None:
         traced = episodes if backend == "single" else 0
     named = named_controllers(controllers)
-    gains = {name: dict(values) for name, values in (gains or {}).items()}
-    for name in gains:
-        if name not in named:
-            raise UnknownNameError("gains", name, among(name, named))
+    gains = gains_by_name(gains, named)
     cells = cells_of(env_id, scenario, dict(env_kwargs or {}), disturbances)
     _try_out(backend, cells, named, gains)
 
@@ -235,6 +232,25 @@ def named_controllers(controllers: Any) -> dict[str, Policy | ControllerSpec]:
         else:
             raise OptionError("controllers", item, "a registered name, or an object with `predict`")
     return named
+
+
+def gains_by_name(gains: Any, named: Collection[str]) -> dict[str, dict[str, Any]]:
+    """Gains of each controller that has any given, in dictionaries of their own.
+
+    Raises:
+        UnknownNameError: for gains of a controller that is not among those named.
+        OptionError: if they are not a mapping of controllers to mappings of their gains.
+    """
+    if gains is None:
+        return {}
+    if not isinstance(gains, Mapping):
+        raise OptionError("gains", gains, "a mapping of controllers to mappings of their gains")
+    for name, values in gains.items():
+        if name not in named:
+            raise UnknownNameError("gains", name, among(name, named))
+        if not (isinstance(values, Mapping) and all(isinstance(gain, str) for gain in values)):
+            raise OptionError(f"gains of {name!r}", values, "a mapping of its gains")
+    return {name: dict(values) for name, values in gains.items()}
 
 
 def cells_of(

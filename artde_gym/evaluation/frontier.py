@@ -34,10 +34,10 @@ import gymnasium as gym
 import numpy as np
 import pandas as pd
 
-from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.errors import OptionError, among
 from artde_gym.evaluation import statistics
 from artde_gym.evaluation.environments import Backend, arguments_of
-from artde_gym.evaluation.evaluate import CUSTOM, Update, evaluate
+from artde_gym.evaluation.evaluate import CUSTOM, Update, evaluate, gains_by_name
 from artde_gym.evaluation.frontier_axis import Axis, axis
 from artde_gym.evaluation.frontier_standard import Harder, standard_test
 from artde_gym.evaluation.provenance import provenance
@@ -130,10 +130,7 @@ def frontier(
     if not (isinstance(survival, (int, float)) and 0 < survival <= 1):
         raise OptionError("survival", survival, "above 0 up to 1")
     named = _named(controllers)
-    gains = {name: dict(values) for name, values in (gains or {}).items()}
-    for name in gains:
-        if name not in named:
-            raise UnknownNameError("gains", name, among(name, named))
+    gains = gains_by_name(gains, named)
     varied = axis(env_id, vary, low, high, tolerance, harder)
     arguments = _arguments(env_id, backend, varied, env_kwargs or {})
     if disturbances is None:
