@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from artde_gym.cli.arguments import (
     WALK,
@@ -23,7 +22,7 @@ from artde_gym.cli.arguments import (
     optional_json,
     processes,
 )
-from artde_gym.cli.display import Display
+from artde_gym.cli.display import Display, terminal
 from artde_gym.evaluation import tune as run_tuning
 from artde_gym.evaluation.tune_console import print_tuning
 
@@ -47,7 +46,7 @@ def tune(
 ) -> None:
     """Tune gains with the same budget for every controller; the same command continues an interrupted run."""
     kwargs = environment_kwargs(env_kwargs, engine)
-    console = Console()
+    console = terminal()
     with Display(console) as display:
         found = run_tuning(
             names(controllers),

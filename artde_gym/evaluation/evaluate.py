@@ -6,6 +6,7 @@ import functools
 import hashlib
 import itertools
 import json
+import math
 import pickle
 from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
@@ -14,6 +15,7 @@ from typing import Any, NamedTuple, get_args
 import numpy as np
 import pandas as pd
 
+from artde_gym.arguments import number, whole
 from artde_gym.errors import OptionError, UnknownNameError, among
 from artde_gym.evaluation.batch import run_batch
 from artde_gym.evaluation.environments import Backend, single, tracking_of, vector
@@ -29,6 +31,9 @@ from artde_gym.registration import ControllerSpec, make_controller, register_spe
 DEFAULT_ENVIRONMENT = "BipedWalk-Payload-v0"
 CUSTOM = "custom"
 """Name of the scenario when an environment is evaluated as it is."""
+
+MOST_EPISODES, MOST_WORKERS = 1_000_000, 1024
+SLOWEST = 1e-3  # Hz, of stored signals
 
 CHUNK = 2500
 """Episodes at most that run at once in the batch backend: no result depends on it, and more would be little faster."""
@@ -112,20 +117,15 @@ def evaluate(
         UnknownNameError, OptionError, DisturbanceError, GainError: for a bad argument, before the first episode.
         StoreError: if `out` holds other results.
     """
-    if not (isinstance(episodes, int) and episodes >= 1):
-        raise OptionError("episodes", episodes, "a whole number >= 1")
-    if not (isinstance(workers, int) and workers >= 1):
-        raise OptionError("workers", workers, "a whole number >= 1")
-    if not (isinstance(seed, int) and seed >= 0):
-        raise OptionError("seed", seed, "a whole number >= 0")
-    if not trace_hz > 0:
-        raise OptionError("trace_hz", trace_hz, "a number > 0")
+    whole("episodes", episodes, 1, MOST_EPISODES)
+    whole("workers", workers, 1, MOST_WORKERS)
+    whole("seed", seed, 0)
+    number("trace_hz", trace_hz, SLOWEST, math.inf, f"a number >= {SLOWEST:g} (Hz), infinite for every sample")
     if backend not in get_args(Backend):
         raise OptionError("backend", backend, among(backend, get_args(Backend)))
-    if not (traced is None or (isinstance(traced, int) and traced >= 0)):
-        raise OptionError("traced", traced, "a whole number >= 0, or None")
     if traced is None:
         traced = episodes if backend == "single" else 0
+    whole("traced", traced, 0)
     named = named_controllers(controllers)
     gains = gains_by_name(gains, named)
     cells = cells_of(env_id, scenario, dict(env_kwargs or {}), disturbances)

@@ -30,14 +30,13 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 import pandas as pd
 
 from artde_gym.errors import OptionError, among
 from artde_gym.evaluation import statistics
 from artde_gym.evaluation.environments import Backend, arguments_of
-from artde_gym.evaluation.evaluate import CUSTOM, Update, evaluate, gains_by_name
+from artde_gym.evaluation.evaluate import CUSTOM, Cell, Update, evaluate, gains_by_name, tried
 from artde_gym.evaluation.frontier_axis import Axis, axis
 from artde_gym.evaluation.frontier_standard import Harder, standard_test
 from artde_gym.evaluation.provenance import provenance
@@ -141,7 +140,7 @@ def frontier(
     placed = {value: varied.place(value, disturbances, arguments) for value in (grid[0], grid[-1])}
     if varied.kind is None:  # nothing here knows the argument's range: let the environment refuse it at once
         for _, end in placed.values():
-            gym.make(env_id, disable_env_checker=True, **end).close()
+            tried("single", Cell(CUSTOM, env_id, end))
 
     configuration = {
         "env": env_id,

@@ -14,10 +14,12 @@ from typing import Any, Literal, get_args
 
 import pandas as pd
 
+from artde_gym.arguments import whole
 from artde_gym.errors import ArtdeGymError, OptionError, StoreError, among
 from artde_gym.evaluation import sweep_part
 from artde_gym.evaluation.evaluate import (
     CHUNK,
+    MOST_WORKERS,
     Task,
     Update,
     chunks_of,
@@ -88,8 +90,7 @@ def sweep(
         StoreError: if `out` holds anything else, is used by another process, or cannot be written (a full disk).
         WorkerError: if workers keep ending before their episodes do.
     """
-    if not (isinstance(workers, int) and workers >= 1):
-        raise OptionError("workers", workers, "a whole number >= 1")
+    whole("workers", workers, 1, MOST_WORKERS)
     if executor not in get_args(Executor):
         allowed = f"{among(executor, get_args(Executor))}; a physics engine is an argument of environments (env_kwargs)"
         raise OptionError("executor", executor, allowed)
