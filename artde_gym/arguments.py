@@ -37,6 +37,20 @@ def number(field: str, value: Any, low: float, high: float, allowed: str) -> flo
     return float(value)
 
 
+def whole(field: str, value: Any, low: int, high: int | None = None) -> int:
+    """The value as an int, if it is a whole number from `low` to `high`; None for no upper end.
+
+    Raises:
+        OptionError: if it is not.
+    """
+    real = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not (real and low <= value and (high is None or value <= high)):
+        raise OptionError(
+            field, value, f"a whole number >= {low}" if high is None else f"a whole number, {low} to {high}"
+        )
+    return int(value)
+
+
 def word(field: str, value: object, known: Collection[str]) -> str:
     """The value, if it is one of the known words.
 

@@ -74,7 +74,7 @@ def environment_kwargs(text: str | None, engine: str | None) -> dict[str, Any]:
 
 def processes(workers: int | None) -> int:
     """As many as were asked for, or all cores."""
-    return workers or os.cpu_count() or 1
+    return (os.cpu_count() or 1) if workers is None else workers
 
 
 def folder_of(out: Path | None) -> Path:

@@ -15,6 +15,7 @@ from rich.text import Text
 from artde_gym.benchmark import SECTIONS, Section, measure
 from artde_gym.benchmark.page import page, record, written
 from artde_gym.cli.arguments import names
+from artde_gym.cli.display import terminal
 from artde_gym.evaluation.store import write_atomically
 
 
@@ -27,12 +28,12 @@ def benchmark(
     page_file: Annotated[Path | None, typer.Option("--page", help="Write docs/benchmark.md, or such a page.")] = None,
 ) -> None:
     """Measure speed and memory of environments and controllers, as ratios in one run; some minutes."""
-    console = Console()
+    console = terminal()
     with console.status("") as status:
         found = measure(
             None if sections is None else names(sections),
             quick=quick,
-            on_section=lambda name: status.update(f"measuring: {name}"),
+            on_section=lambda name: status.update(Text(f"measuring: {name}")),
         )
     for section in found.values():
         _print(section, console)

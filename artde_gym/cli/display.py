@@ -8,6 +8,16 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from artde_gym.evaluation.evaluate import Update
 
 
+def terminal() -> Console:
+    """A console for which every text is just what it says: brackets in a path or a label are no markup."""
+    return Console(markup=False, emoji=False)
+
+
+def words(field: str) -> TextColumn:
+    """A column of a progress bar that shows a field of its task, brackets and all."""
+    return TextColumn(f"{{task.{field}}}", markup=False)
+
+
 class Display:
     """Live progress of an evaluation: a bar of finished episodes, and how far the running ones are."""
 
@@ -15,11 +25,11 @@ class Display:
         self._running: dict[tuple[str, str, str], float] = {}
         self._what = "episodes"
         self._progress = Progress(
-            TextColumn("{task.fields[what]}"),
+            words("fields[what]"),
             BarColumn(),
             MofNCompleteColumn(),
             TimeElapsedColumn(),
-            TextColumn("{task.description}"),
+            words("description"),
             console=console,
         )
         self._bar = self._progress.add_task("", total=None, what="episodes")

@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from artde_gym.cli.arguments import names
+from artde_gym.cli.display import terminal
 from artde_gym.doctor import CHECKS, Report, examine
 
 LOOK = {"ok": ("ok", "green"), "missing": ("--", "yellow"), "failed": ("FAILED", "bold red")}
@@ -24,7 +25,7 @@ def doctor(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Check whether this machine can run everything, and say what to do; exit code 1 if something necessary fails."""
-    console = Console()
+    console = terminal()
     found: dict[str, Report] = {}
     start = time.monotonic()
     for name, report in examine(None if checks is None else names(checks)):

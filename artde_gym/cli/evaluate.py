@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from artde_gym.cli.arguments import (
     WALK,
@@ -29,7 +28,7 @@ from artde_gym.cli.arguments import (
     optional_json,
     processes,
 )
-from artde_gym.cli.display import Display
+from artde_gym.cli.display import Display, terminal
 from artde_gym.cli.report import show_report
 from artde_gym.evaluation import evaluate as run_evaluation
 from artde_gym.evaluation.console import print_result
@@ -71,7 +70,7 @@ def evaluate(
             scenario = scenario.split(",")[0]
     kwargs = environment_kwargs(env_kwargs, engine)
     folder = folder_of(out)
-    console = Console()
+    console = terminal()
     with Display(console) as display:
         result = run_evaluation(
             names(controllers),

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from artde_gym.cli.arguments import (
     AllowMixed,
@@ -26,7 +25,7 @@ from artde_gym.cli.arguments import (
     optional_json,
     processes,
 )
-from artde_gym.cli.display import Display
+from artde_gym.cli.display import Display, terminal
 from artde_gym.cli.report import show_report
 from artde_gym.kit import ROBOTS
 from artde_gym.studies import frontier as run_frontier
@@ -58,7 +57,7 @@ def frontier(
 ) -> None:
     """Find how much of one disturbance each controller survives; the same command continues an interrupted run."""
     kwargs = environment_kwargs(env_kwargs, engine)
-    console = Console()
+    console = terminal()
     with Display(console) as display:
         found = run_frontier(
             names(controllers),

@@ -14,6 +14,7 @@ from rich.text import Text
 
 from artde_gym.cli.arguments import names
 from artde_gym.cli.catalogue import TOPICS, Entries
+from artde_gym.cli.display import terminal
 from artde_gym.errors import UnknownNameError, among
 
 Shown = Callable[[Entries, Console], None]
@@ -35,7 +36,7 @@ def list_everything(
     if as_json:
         print(json.dumps(found if topic is None else found[topic], indent=2))
         return
-    console = Console()
+    console = terminal()
     for one, entries in found.items():
         (_SHORT if topic is None else _FULL)[one](entries, console)
     if topic is None:

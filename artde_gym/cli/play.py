@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from artde_gym.arguments import whole
 from artde_gym.cli.arguments import (
     WALK,
     Disturbances,
@@ -37,12 +38,13 @@ def play(
     from artde_gym.play import HELP, Session
     from artde_gym.sim.window import Window
 
-    kwargs = environment_kwargs(env_kwargs, engine)
+    whole("seed", seed, 0)
+    kwargs, overrides = environment_kwargs(env_kwargs, engine), json_object("--gains", gains)
     (cell,) = cells_of(env, scenario, kwargs, optional_json("--disturbances", disturbances))
     window = Window()
     try:
         plant = single(cell.env_id, json.dumps(cell.kwargs))
-        policy = make_controller(controller, plant, **json_object("--gains", gains))
+        policy = make_controller(controller, plant, **overrides)
         window.load(plant.unwrapped.engine.spec)
         print("\n".join((*HELP, "A click pushes away from you, at the nearest place on the robot.")))
         Session(plant, policy, window, controller, seed).run()

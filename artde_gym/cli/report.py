@@ -7,8 +7,10 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
+from rich.text import Text
 
 from artde_gym.cli.arguments import Pictures, Videos
+from artde_gym.cli.display import terminal
 
 
 def report(
@@ -17,7 +19,7 @@ def report(
     videos: Videos = False,
 ) -> None:
     """Write report.html into a results folder, finished or not: one file that needs no network."""
-    show_report(folder, Console(), pictures=pictures, videos=videos)
+    show_report(folder, terminal(), pictures=pictures, videos=videos)
 
 
 def show_report(folder: Path, console: Console, *, pictures: bool = False, videos: bool = False) -> None:
@@ -25,5 +27,7 @@ def show_report(folder: Path, console: Console, *, pictures: bool = False, video
     from artde_gym.report import write_report  # only when asked for
 
     with console.status("Report") as status:
-        file = write_report(folder, pictures=pictures, videos=videos, on_progress=status.update)
+        file = write_report(
+            folder, pictures=pictures, videos=videos, on_progress=lambda text: status.update(Text(text))
+        )
     console.print(f"Report: {file}", soft_wrap=True)

@@ -7,11 +7,11 @@ from typing import Annotated
 
 import pandas as pd
 import typer
-from rich.console import Console
 
 from artde_gym.cli.arguments import ENGINES, AllowMixed, Pictures, Report, Seed, Videos, Workers, names, processes
-from artde_gym.cli.display import Display
+from artde_gym.cli.display import Display, terminal
 from artde_gym.cli.report import show_report
+from artde_gym.errors import OptionError
 from artde_gym.evaluation.console import print_claims, print_result
 from artde_gym.studies import reproduce as run_reproduction
 from artde_gym.studies.reproduce.claims import confirm
@@ -41,11 +41,12 @@ def reproduce(
     robots = titles() if robot == "all" else [robot]
     engines = list(ENGINES) if engine == "both" else [engine]
     named = None if scenario is None else names(scenario)
-    console = Console()
-    for name in robots:
-        chosen = scenarios_of(name, named)
-        if not chosen:
-            continue
+    shares = {name: chosen for name in robots if (chosen := scenarios_of(name, named))}
+    for one in named or ():
+        if not any(one in chosen for chosen in shares.values()):
+            raise OptionError("scenario", one, f"one of the robot's, which is {robot!r}")
+    console = terminal()
+    for name, chosen in shares.items():
         verdicts: dict[str, pd.DataFrame] = {}
         for one in engines:
             with Display(console) as display:

@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from artde_gym.cli.arguments import AllowMixed, Workers, processes
-from artde_gym.cli.display import Display
+from artde_gym.cli.display import Display, terminal
 from artde_gym.studies import sweep as run_sweep
 from artde_gym.studies.sweep.console import print_sweep
 
@@ -27,7 +26,7 @@ def sweep(
     allow_mixed: AllowMixed = False,
 ) -> None:
     """Run a grid or a random sample of cells; the same command continues after whatever happened."""
-    console = Console()
+    console = terminal()
     with Display(console) as display:
         found = run_sweep(
             file,

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from artde_gym.cli.arguments import Engine, EnvKwargs, Report, Seed, environment_kwargs, json_object, processes
+from artde_gym.cli.display import terminal, words
 from artde_gym.cli.report import show_report
 from artde_gym.errors import OptionError
 
@@ -61,7 +61,7 @@ def train(
             raise
         raise OptionError("algo", algo, "what is installed; pip install 'artde-gym[rl]'") from error
     columns = (TextColumn("decisions"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    bar = Progress(*columns, TextColumn("{task.description}"))
+    bar = Progress(*columns, words("description"))
     shown = bar.add_task("", total=steps)
 
     def on_progress(news: TrainingProgress) -> None:
@@ -75,4 +75,4 @@ def train(
             bar.stop()
     print(f"best policy: {policy}")
     if report:
-        show_report(out, Console())
+        show_report(out, terminal())

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from artde_gym.cli.arguments import (
     WALK,
@@ -24,7 +23,7 @@ from artde_gym.cli.arguments import (
     optional_json,
     processes,
 )
-from artde_gym.cli.display import Display
+from artde_gym.cli.display import Display, terminal
 from artde_gym.studies import tune as run_tuning
 from artde_gym.studies.tune.console import print_tuning
 
@@ -49,7 +48,7 @@ def tune(
 ) -> None:
     """Tune gains with the same budget for every controller; the same command continues an interrupted run."""
     kwargs = environment_kwargs(env_kwargs, engine)
-    console = Console()
+    console = terminal()
     with Display(console) as display:
         found = run_tuning(
             names(controllers),

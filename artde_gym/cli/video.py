@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import Progress, TextColumn, TimeElapsedColumn
+from rich.progress import Progress, TimeElapsedColumn
 
 from artde_gym.cli.arguments import (
     WALK,
@@ -23,6 +22,7 @@ from artde_gym.cli.arguments import (
     names,
     optional_json,
 )
+from artde_gym.cli.display import terminal, words
 
 
 def video(
@@ -46,8 +46,8 @@ def video(
     """Show one or several controllers, side by side, in an episode of `evaluate`."""
     from artde_gym.video import video as make_video  # only when asked for
 
-    console = Console()
-    columns_shown = (TextColumn("{task.description}"), TimeElapsedColumn())
+    console = terminal()
+    columns_shown = (words("description"), TimeElapsedColumn())
     with Progress(*columns_shown, console=console, transient=True) as bar:
         shown = bar.add_task("")
         file = make_video(

@@ -19,6 +19,9 @@ from artde_gym.tracking import Tracking
 Backend = Literal["single", "batch"]
 """One environment for each episode in a physics engine, or many episodes in one vector environment."""
 
+PICTURES = ("width", "height", "render_mode")
+"""Arguments of environments that change their pictures alone."""
+
 KEPT = 4  # environments a process; each one holds a physics client
 
 
@@ -105,6 +108,7 @@ def _class(env_id: str) -> Any:
 
 def _checked(env_id: str, arguments: str, backend: Backend) -> dict[str, Any]:
     known, given = arguments_of(env_id, backend), json.loads(arguments)
+    known = {name: argument for name, argument in known.items() if name != "render_mode"}  # asked for by `drawing`
     for name in given:
         if name not in known:
             raise OptionError(f"argument of {env_id}", name, among(name, known))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 import json
+import math
 import pickle
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any, NamedTuple, get_args
 import numpy as np
 import pandas as pd
 
+from artde_gym.arguments import number, whole
 from artde_gym.errors import OptionError, UnknownNameError, among
 from artde_gym.evaluation import canonical
 from artde_gym.evaluation.batch import run_batch
@@ -33,6 +35,9 @@ from artde_gym.scenarios import scenario as find_scenario
 DEFAULT_ENVIRONMENT = "BipedWalk-Payload-v0"
 CUSTOM = "custom"
 """Name of the scenario when an environment is evaluated as it is."""
+
+MOST_EPISODES = 1_000_000
+SLOWEST = 1e-3  # Hz, of stored signals
 
 CHUNK = 2500
 """Episodes at most that run at once in the batch backend: no result depends on it, and more would be little faster."""
@@ -120,19 +125,15 @@ def evaluate(
         UnknownNameError, OptionError, DisturbanceError, GainError: for a bad argument, before the first episode.
         StoreError: if `out` holds other results, or results of other software, or is written by another process.
     """
-    if not (isinstance(episodes, int) and episodes >= 1):
-        raise OptionError("episodes", episodes, "a whole number >= 1")
+    whole("episodes", episodes, 1, MOST_EPISODES)
     check_workers(workers)
-    if not (isinstance(seed, int) and seed >= 0):
-        raise OptionError("seed", seed, "a whole number >= 0")
-    if not trace_hz > 0:
-        raise OptionError("trace_hz", trace_hz, "a number > 0")
+    whole("seed", seed, 0)
+    number("trace_hz", trace_hz, SLOWEST, math.inf, f"a number >= {SLOWEST:g} (Hz), infinite for every sample")
     if backend not in get_args(Backend):
         raise OptionError("backend", backend, among(backend, get_args(Backend)))
-    if not (traced is None or (isinstance(traced, int) and traced >= 0)):
-        raise OptionError("traced", traced, "a whole number >= 0, or None")
     if traced is None:
         traced = episodes if backend == "single" else 0
+    whole("traced", traced, 0)
     named = named_controllers(controllers)
     gains = checked_gains(gains, named)
     cells = cells_of(env_id, scenario, dict(env_kwargs or {}), disturbances)
@@ -297,20 +298,23 @@ def cells_of(
     return cells
 
 
-def checked_gains(given: Any, named: Collection[str]) -> dict[str, dict[str, Any]]:
-    """Gains of named controllers.
+def checked_gains(gains: Any, named: Collection[str]) -> dict[str, dict[str, Any]]:
+    """Gains of each controller that has any given, in dictionaries of their own.
 
     Raises:
-        OptionError, UnknownNameError: for anything but mappings, or a controller that is not among the named.
+        UnknownNameError: for gains of a controller that is not among those named.
+        OptionError: if they are not a mapping of controllers to mappings of their gains.
     """
-    if not (
-        given is None or (isinstance(given, Mapping) and all(isinstance(gains, Mapping) for gains in given.values()))
-    ):
-        raise OptionError("gains", given, "a mapping of controllers to mappings of their gains")
-    for name in given or {}:
+    if gains is None:
+        return {}
+    if not isinstance(gains, Mapping):
+        raise OptionError("gains", gains, "a mapping of controllers to mappings of their gains")
+    for name, values in gains.items():
         if name not in named:
             raise UnknownNameError("gains", name, among(name, named))
-    return {name: dict(gains) for name, gains in (given or {}).items()}
+        if not (isinstance(values, Mapping) and all(isinstance(gain, str) for gain in values)):
+            raise OptionError(f"gains of {name!r}", values, "a mapping of its gains")
+    return {name: dict(values) for name, values in gains.items()}
 
 
 def _try_out(

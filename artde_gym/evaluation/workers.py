@@ -19,7 +19,8 @@ from multiprocessing import connection
 from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any
 
-from artde_gym.errors import OptionError, WorkerError
+from artde_gym.arguments import whole
+from artde_gym.errors import WorkerError
 
 AHEAD = 2
 """Jobs a worker that are handed out at once: no worker waits for its next one, and a million of them do not pile up."""
@@ -28,6 +29,7 @@ GRACE = 5.0
 """Time (s) that workers have to stop by themselves after an interruption; a second one ends them at once."""
 UNGUARDED = 79
 """Exit code of a worker that would have started workers of its own, since its script starts them when imported."""
+MOST_WORKERS = 1024
 DEATHS = 3
 """How often in a row a worker may end, without a finished job in between, before the jobs are believed to kill it."""
 GUARD = "a script that starts nothing when it is imported: put the call below `if __name__ == '__main__':`"
@@ -149,10 +151,9 @@ def check_workers(workers: Any) -> None:
     A worker that gets here while it imports its parent's script, which has no main guard, ends at once.
 
     Raises:
-        OptionError: unless it is a whole number >= 1.
+        OptionError: unless it is a whole number from 1 to `MOST_WORKERS`.
     """
-    if not (isinstance(workers, int) and workers >= 1):
-        raise OptionError("workers", workers, "a whole number >= 1")
+    whole("workers", workers, 1, MOST_WORKERS)
     if getattr(multiprocessing.current_process(), "_inheriting", False):  # as multiprocessing itself asks
         sys.exit(UNGUARDED)
 

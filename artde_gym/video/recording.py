@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from artde_gym.arguments import number, whole
 from artde_gym.errors import OptionError
-from artde_gym.evaluation.evaluate import cells_of, checked_gains, named_controllers
+from artde_gym.evaluation.environments import arguments_of
+from artde_gym.evaluation.evaluate import Cell, cells_of, checked_gains, named_controllers, tried
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.scenarios import SCENARIOS
@@ -20,6 +23,10 @@ from artde_gym.video import writer
 from artde_gym.video.frames import Shot, shots
 from artde_gym.video.tiles import panels
 
+SPEEDS = (0.001, 1000.0)
+"""Slowest and fastest, shown over simulated time."""
+MOST = 20_000  # pictures: eleven minutes at thirty a second
+EARLY = 1e-9  # s, that a sample may lie before its time
 HELD = 1.0  # s, for which the last picture is shown after everybody has ended
 
 
@@ -52,7 +59,7 @@ def video(
         seed, episode: which one of an evaluation's episodes.
         start, end: part that is shown (s); the simulation begins at 0 nevertheless.
         speed: 0.5 shows it half as fast.
-        fps: pictures a second of the video.
+        fps: pictures a second of the video; 50 at most in a GIF and 90 in a WebP, as browsers slow down faster ones.
         width: of one controller's panel (pixels), whose height is three quarters of it.
         columns: panels in a row; None for all of them.
         on_progress: called with the simulated time (s) of each picture.
@@ -65,27 +72,24 @@ def video(
             or ffmpeg is missing.
     """
     out = Path(out)
-    for name, value in {"speed": speed, "fps": fps}.items():
-        if not 0 < value < math.inf:
-            raise OptionError(name, value, "a finite number > 0")
-    if not 0 <= start < math.inf:
-        raise OptionError("start", start, "a finite number >= 0 (s)")
-    if not end > start:
-        raise OptionError("end", end, f"a number > the start, {start:g} (s)")
-    if not (columns is None or (isinstance(columns, int) and columns >= 1)):
-        raise OptionError("columns", columns, "a whole number >= 1")
+    speed = number("speed", speed, *SPEEDS, "a number from {:g} to {:g}".format(*SPEEDS))
+    start = number("start", start, 0.0, sys.float_info.max, "a finite number >= 0 (s)")
+    end = number("end", end, math.nextafter(start, math.inf), math.inf, f"a number > the start, {start:g} (s)")
+    columns = None if columns is None else whole("columns", columns, 1)
+    own_seed = episode_seed(whole("seed", seed, 0), whole("episode", episode, 0))
     writer.check(out)
     named = named_controllers(controllers)
     gains = checked_gains(gains, named)
     (cell,) = cells_of(env_id, scenario, dict(env_kwargs or {}), disturbances)
     fps = writer.frame_rate(out, fps)
+    _check_part(out, cell, start, end, speed / fps)
     films = {
         name: shots(
             cell.env_id,
             cell.kwargs,
             policy,
             gains.get(name, {}),
-            episode_seed(seed, episode),
+            own_seed,
             _times(start, end, speed / fps),
             width,
         )
@@ -97,12 +101,26 @@ def video(
 
     def pictures() -> Iterator[NDArray[np.uint8]]:
         for shown in _together(films, held=math.ceil(HELD * fps)):
+            reached = max(shot.time_s for shot in shown.values())
+            if reached < start - EARLY:  # nobody is there any more
+                raise OptionError("start", start, f"up to the end of the episode, {reached:g} s")
             if on_progress is not None:
-                on_progress(max(shot.time_s for shot in shown.values()))
+                on_progress(reached)
             yield panels(shown, title, min(columns or len(shown), len(shown)))
 
     writer.write(out, pictures(), fps)
     return out
+
+
+def _check_part(out: Path, cell: Cell, start: float, end: float, step: float) -> None:
+    """See that the part to be shown begins within the episode, and that its pictures are not too many."""
+    tried("single", cell)
+    duration = cell.kwargs.get("duration", arguments_of(cell.env_id)["duration"].default)
+    if start > duration:
+        raise OptionError("start", start, f"up to the end of the episode, {duration:g} s")
+    count = math.ceil((min(end, duration) - start) / step)
+    if out.suffix != ".png" and count > MOST:
+        raise OptionError("number of pictures", count, f"at most {MOST}: a shorter part, less slow, or fewer a second")
 
 
 def _times(start: float, end: float, step: float) -> Iterator[float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from artde_gym.arguments import number
 from artde_gym.errors import OptionError
 
 Picture = NDArray[np.uint8]
@@ -20,6 +22,12 @@ CODECS: dict[str, list[str]] = {
     ".webm": ["-c:v", "libvpx-vp9", "-crf", "36", "-b:v", "0", "-cpu-used", "5", "-row-mt", "1", "-pix_fmt", "yuv420p"],
 }
 SUFFIXES = (*CODECS, ".gif", ".webp", ".png")
+UNITS = {".gif": 100, ".webp": 1000}
+"""Suffix -> parts of a second in which its files count the time that a picture is shown."""
+FASTEST = {".gif": 50.0, ".webp": 90.0}
+"""Suffix -> most pictures a second: browsers show what is shorter than 2 and 11 units for a tenth of a second."""
+RATES = (0.01, 1000.0)
+"""Slowest and fastest that can be asked for, pictures a second."""
 COLOURS = 192  # of a GIF
 SAMPLED = 12  # pictures that a GIF's palette is made of
 QUALITY = 75  # of a WebP
@@ -38,8 +46,23 @@ def check(out: Path) -> None:
 
 
 def frame_rate(out: Path, fps: float) -> float:
-    """The closest rate that the format can have: a GIF counts in hundredths of a second."""
-    return 100 / max(2, round(100 / fps)) if out.suffix == ".gif" else fps
+    """The closest rate that a file can have: MP4 and WebM are told it in hundredths, GIF and WebP have a fastest one.
+
+    Raises:
+        OptionError: for one that is not within `RATES`.
+    """
+    slowest, fastest = RATES
+    given = number("fps", fps, slowest, fastest, f"a number from {slowest:g} to {fastest:g}")
+    return round(given, 2) if out.suffix in CODECS else min(given, FASTEST.get(out.suffix, fastest))
+
+
+def durations(count: int, fps: float, units: int) -> list[int]:
+    """How long each picture is shown, in whole parts of a second of which there are `units`, as (count,) numbers.
+
+    What one is rounded by, the next one makes up for: each begins within half a part of its time.
+    """
+    ends = (round(i * units / fps) for i in range(count + 1))
+    return [end - start for start, end in itertools.pairwise(ends)]
 
 
 def write(out: Path, pictures: Iterator[Picture], fps: float) -> None:
@@ -82,13 +105,19 @@ def _gif(out: Path, pictures: Iterator[Picture], fps: float) -> None:
     frames = [Image.fromarray(picture) for picture in pictures]
     sample = np.concatenate([np.asarray(frame) for frame in frames[:: -(-len(frames) // SAMPLED)] + frames[-1:]])
     palette = Image.fromarray(sample).quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
-    first, *rest = (frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
-    first.save(out, save_all=True, append_images=rest, duration=1000 / fps, loop=0, optimize=True)
+    _animate(out, [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames], fps, optimize=True)
 
 
 def _webp(out: Path, pictures: Iterator[Picture], fps: float) -> None:
-    first, rest = Image.fromarray(next(pictures)), [Image.fromarray(picture) for picture in pictures]
-    first.save(out, save_all=True, append_images=rest, duration=round(1000 / fps), loop=0, quality=QUALITY, method=4)
+    _animate(out, [Image.fromarray(picture) for picture in pictures], fps, quality=QUALITY, method=4)
+
+
+def _animate(out: Path, frames: list[Image.Image], fps: float, **options: Any) -> None:
+    """Save frames that are shown for ever again; Pillow takes milliseconds for both formats."""
+    units = UNITS[out.suffix]
+    shown = [1000 // units * duration for duration in durations(len(frames), fps, units)]
+    first, *rest = frames
+    first.save(out, save_all=True, append_images=rest, duration=shown, loop=0, **options)
 
 
 def _png(out: Path, pictures: Iterator[Picture], _fps: float) -> None:

@@ -25,9 +25,9 @@ from artde_gym.registration import registered_controllers
 from artde_gym.video import video
 from artde_gym.video.frames import Shot, shots
 from artde_gym.video.tiles import FALLEN, panels
-from artde_gym.video.writer import frame_rate
+from artde_gym.video.writer import durations, frame_rate, write
 
-WALK = "BipedWalk-Payload-v0"
+WALK, FLYER = "BipedWalk-Payload-v0", "QuadInfinity-Payload-v0"
 SHOVE = {"body": "chest", "magnitude": 80.0, "direction": [1.0, 0.0, 0.0], "start": 0.2, "duration": 0.2}
 FALL: dict[str, Any] = {"disturbances": {"push": [SHOVE]}, "env_kwargs": {"duration": 3.0, "control_period": 0.004}}
 FLIGHT: dict[str, Any] = {"env_kwargs": {"duration": 2.0}, "disturbances": {"payload": 0.35}}
@@ -130,10 +130,49 @@ def test_panels_freeze_who_has_ended_and_fill_rows() -> None:
     assert (page[-62:-4, 84:] > 250).all()  # the fourth place is free
 
 
-def test_a_gif_counts_in_hundredths_of_a_second() -> None:
-    assert frame_rate(Path("x.gif"), 30.0) == pytest.approx(100 / 3)
+RATES = [0.01, 0.1, 1.0, 7.0, 12.0, 15.0, 24.0, 25.0, 29.97, 30.0, 33.0, 40.0, 48.0, 50.0, 60.0, 75.0, 90.0, 1000.0]
+
+
+def played(path: Path) -> int:
+    """Milliseconds that a viewer takes for a GIF or a WebP, as its frames say."""
+    with Image.open(path) as film:
+        total = 0
+        for number in range(getattr(film, "n_frames", 1)):
+            _at(film, number).load()
+            total += film.info["duration"]
+    return total
+
+
+@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize(("suffix", "unit"), [(".gif", 10), (".webp", 1)])
+def test_a_file_plays_for_as_long_as_its_pictures_take(tmp_path: Path, suffix: str, unit: int, rate: float) -> None:
+    """To half of what the format counts in (ms), also where pictures that stay the same are stored once."""
+    moving = np.random.default_rng(0).integers(0, 255, (13, 16, 16, 3), dtype=np.uint8)
+    shown, out = [*moving, *moving[-1:].repeat(3, axis=0)], tmp_path / f"x{suffix}"
+    fps = frame_rate(out, rate)
+    write(out, iter(shown), fps)
+    assert played(out) == pytest.approx(1000 * len(shown) / fps, abs=unit / 2 + 1e-6)
+
+
+@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("units", [100, 1000])
+def test_every_picture_begins_within_half_a_part_of_its_time(units: int, rate: float) -> None:
+    ends = np.cumsum(durations(500, rate, units))
+    assert np.abs(ends - np.arange(1, 501) * units / rate).max() <= 0.5 + 1e-9
+
+
+def test_the_fastest_rate_is_that_of_browsers() -> None:
+    assert frame_rate(Path("x.gif"), 30.0) == frame_rate(Path("x.webp"), 30.0) == 30.0
     assert frame_rate(Path("x.gif"), 1000.0) == 50.0
-    assert frame_rate(Path("x.webp"), 30.0) == 30.0
+    assert min(durations(100, frame_rate(Path("x.webp"), 1000.0), 1000)) == 11
+    assert frame_rate(Path("x.mp4"), 1 / 3) == 0.33  # ffmpeg is told two digits: pictures are of these times, too
+
+
+def test_a_film_plays_at_the_pace_that_was_asked_for(tmp_path: Path) -> None:
+    """Two seconds of a flight at 30 pictures a second."""
+    for suffix in (".gif", ".webp"):
+        out = video(["pid"], tmp_path / f"x{suffix}", FLYER, start=0.2, end=1.2, speed=0.5, width=48, **FLIGHT)
+        assert played(out) == 2000
 
 
 @pytest.mark.parametrize(
@@ -146,6 +185,14 @@ def test_a_gif_counts_in_hundredths_of_a_second() -> None:
         ({"fps": float("nan")}, "fps is nan"),
         ({"columns": 0}, "columns is 0"),
         ({"width": 3}, "width is 3"),
+        ({"fps": 1e-9}, "fps is 1e-09.*0.01 to 1000"),
+        ({"speed": 1e-308}, "speed is 1e-308"),
+        ({"speed": 0.001, "fps": 1000.0, "out": "x.webp"}, "number of pictures is .*at most 20000"),
+        ({"seed": -1}, "seed is -1"),
+        ({"episode": -1}, "episode is -1"),
+        ({"gains": [1]}, "gains is .1.; allowed: a mapping"),
+        ({"gains": {"tde": [1]}}, "gains of 'tde' is .1."),
+        ({"start": 70.5}, "start is 70.5.*the end of the episode, 70 s"),
     ],
 )
 def test_bad_arguments_name_field_value_and_what_is_allowed(
@@ -157,6 +204,12 @@ def test_bad_arguments_name_field_value_and_what_is_allowed(
     assert list(tmp_path.iterdir()) == []
     with pytest.raises(UnknownNameError, match="tdee"):
         video(["tdee"], tmp_path / "x.gif")
+
+
+def test_a_part_after_the_last_fall_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(OptionError, match=r"start is 2\.0; allowed: up to the end of the episode, 0"):
+        video(["tde"], tmp_path / "x.gif", WALK, start=2.0, width=48, **FALL)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_without_ffmpeg_one_clear_line(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

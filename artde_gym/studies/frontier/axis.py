@@ -10,7 +10,7 @@ from typing import Any
 from artde_gym.disturbances import KINDS
 from artde_gym.disturbances.kinds import parameters_of
 from artde_gym.errors import OptionError, UnknownNameError, among
-from artde_gym.evaluation.environments import arguments_of, robot_of
+from artde_gym.evaluation.environments import PICTURES, arguments_of, robot_of
 from artde_gym.kit import Harder
 from artde_gym.studies.frontier.standard import standard_for
 
@@ -121,7 +121,9 @@ def _find(env_id: str, path: str) -> tuple[str | None, str, str]:
     numbers = [
         name
         for name, argument in arguments_of(env_id).items()
-        if isinstance(argument.default, (int, float)) and not isinstance(argument.default, bool)
+        if name not in PICTURES
+        and isinstance(argument.default, (int, float))
+        and not isinstance(argument.default, bool)
     ]
     if path in disturbances:
         return disturbances[path]

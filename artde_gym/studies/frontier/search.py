@@ -29,14 +29,13 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 import pandas as pd
 
 from artde_gym.errors import OptionError, among
 from artde_gym.evaluation import statistics
 from artde_gym.evaluation.environments import Backend, arguments_of
-from artde_gym.evaluation.evaluate import CUSTOM, Update, checked_gains, evaluate, labelled
+from artde_gym.evaluation.evaluate import CUSTOM, Cell, Update, checked_gains, evaluate, labelled, tried
 from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.provenance import MIXED, continued, provenance
 from artde_gym.evaluation.rollout import Policy
@@ -121,7 +120,7 @@ def frontier(
     placed = {value: varied.place(value, disturbances, arguments) for value in (grid[0], grid[-1])}
     if varied.kind is None:  # nothing here knows the argument's range: let the environment refuse it at once
         for _, end in placed.values():
-            gym.make(env_id, disable_env_checker=True, **end).close()
+            tried("single", Cell(CUSTOM, env_id, end))
 
     configuration = {
         "env": env_id,

@@ -28,10 +28,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from artde_gym.arguments import reading
+from artde_gym.arguments import reading, whole
 from artde_gym.errors import OptionError, StoreError
 from artde_gym.evaluation.environments import Backend, single, tracking_of
-from artde_gym.evaluation.evaluate import DEFAULT_ENVIRONMENT, Update, evaluate, policy_for
+from artde_gym.evaluation.evaluate import DEFAULT_ENVIRONMENT, MOST_EPISODES, Update, evaluate, policy_for
 from artde_gym.evaluation.identity import behind
 from artde_gym.evaluation.lock import is_empty, writes_folder
 from artde_gym.evaluation.provenance import MIXED, continued, provenance
@@ -44,6 +44,7 @@ from artde_gym.scenarios import scenario as find_scenario
 RECORD = "tuning.json"
 TUNED = "-tuned"
 """What is added to a controller's name where its tuned gains are meant."""
+MOST_TRIALS = 10_000
 FALL = 1000.0
 """Cost of a fall, in the unit of the error."""
 TRIAL_COLUMNS = ["controller", "trial", "cost", "error", "falls", "gains"]
@@ -110,8 +111,8 @@ def tune(
     """
     check_workers(workers)
     for name, count in (("trials", trials), ("episodes", episodes), ("held_out", held_out)):
-        if not (isinstance(count, int) and count >= 1):
-            raise OptionError(name, count, "a whole number >= 1")
+        whole(name, count, 1, MOST_TRIALS if name == "trials" else MOST_EPISODES)
+    whole("seed", seed, 0)
     if isinstance(controllers, str) or not controllers:
         raise OptionError("controllers", controllers, "a list of names")
     if len(set(controllers)) < len(controllers):
