@@ -44,7 +44,8 @@ class Parameter:
 class Kind:
     """A disturbance by name, for the `robots` that honour it. `scalar` is the parameter that a bare number stands for.
 
-    A `repeated` kind takes a list of entries. Where it names a joint, "all" stands for one entry a joint.
+    A `repeated` kind takes a list of entries. Where it names a joint, "all" stands for one entry a joint. Of the
+    parameters in `one_of` exactly one is given; the others are absent.
     """
 
     name: str
@@ -52,12 +53,14 @@ class Kind:
     parameters: tuple[Parameter, ...]
     scalar: str | None = None
     repeated: bool = False
+    one_of: tuple[str, ...] = ()
     robots: tuple[str, ...] = ROBOTS
 
 
 ALL = "all"
 NEVER = 1e9  # s
 SHAPES = ("half_sine", "double_hump")
+TRIGGERS = ("contact", "plan")
 
 
 def _word(name: str, words: tuple[str, ...] | str, default: str | None, text: str, **other_defaults: str) -> Parameter:
@@ -115,15 +118,25 @@ KINDS: dict[str, Kind] = {
         ),
         Kind(
             "grf_pulse",
-            "An extra upward force on the foot that lands, from the moment of its contact: the ground reaction model "
-            "of the thesis. The engine has contact forces of its own, so this counts them twice; off by default.",
+            "An extra upward force on the foot that lands, through its center of mass, one pulse a landing: the ground "
+            "reaction model of the thesis. The engine has contact forces of its own, so this counts them twice; off by "
+            "default. Exactly one of `magnitude` and `share` is given.",
             (
                 _word("shape", SHAPES, "half_sine", "A sin(pi x), or A (sin(pi x) + q sin(3 pi x)), x = t / duration"),
-                Parameter("magnitude", "N", 0.0, 500.0, 60.0, "A"),
+                Parameter("magnitude", "N", 0.0, 500.0, None, "A"),
+                Parameter("share", "1", 0.0, 5.0, None, "A over the weight of the robot as specified, 88.15 N"),
                 Parameter("duration", "s", 0.005, 2.0, 0.1, "how long; for a double hump the stance, about 1 s"),
                 Parameter("q", "1", -1.0, 1.0, 0.4, "depth between the humps"),
+                _word(
+                    "trigger",
+                    TRIGGERS,
+                    "contact",
+                    "what starts a pulse: a foot's first contact after 0.25 s of its planned swing in the air, or the "
+                    "instant at which the plan puts load on it again",
+                ),
             ),
             scalar="magnitude",
+            one_of=("magnitude", "share"),
             robots=("ojas",),
         ),
         Kind(
@@ -287,7 +300,9 @@ def page() -> str:
         lines += [f"## `{kind.name}`{marks}", "", kind.text, "", "| parameter | unit | allowed | default | meaning |"]
         lines += ["|---|---|---|---|---|"]
         for parameter in kind.parameters:
-            default = "required" if parameter.default is None else f"`{parameter.default}`"
+            default = f"`{parameter.default}`"
+            if parameter.default is None:
+                default = "one of these" if parameter.name in kind.one_of else "required"
             default += "".join(f"; {robot}: `{value}`" for robot, value in parameter.other_defaults.items())
             text = parameter.text + (" (what a bare number stands for)" if parameter.name == kind.scalar else "")
             row = (f"`{parameter.name}`", parameter.unit, allowed(parameter), default, text)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from artde_gym.arguments import action_array
 from artde_gym.arrays import Array
-from artde_gym.disturbances.ground import LOADED
+from artde_gym.disturbances.ground import LOADED, GrfPulses
 from artde_gym.disturbances.schedule import Schedule
 from artde_gym.envs import biped_task as task
 from artde_gym.envs.biped_course import Course
@@ -118,6 +118,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self._k = walk.last  # no step before the first reset
         self._state, self._realised = self._engine.read(), {}
         self._course = Course(self._realised, walk, self.np_random)
+        self._pulses: GrfPulses | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
         """Start a walk; `options` are those of the class' documentation.
@@ -191,6 +192,10 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self._walk.set_up(self._engine, realised)
         self._course = Course(realised, self._walk, self.np_random)
         self._course.start(self._engine)
+        self._pulses = None
+        if "grf_pulse" in realised:
+            self._pulses = self._walk.pulses(1)
+            self._pulses.begin(0, realised["grf_pulse"], self.nominal_robot)
         steps = task.settling(realised)
         tau = self._settle(self._walk.pose(realised), steps) if steps else self._still
         self._course.settled(tau)
@@ -212,7 +217,11 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         first = self.elapsed
         course.begin(command)
         for step in range(first, first + self._walk.substeps):
-            engine.step(course.act(step, engine, events))
+            tau = course.act(step, engine, events)
+            if self._pulses is not None:
+                loads = np.array([engine.foot_loads()])
+                engine.lift_feet(self._pulses.forces(loads, np.array([step]))[0].tolist())
+            engine.step(tau)
         self._tau = course.applied()
         return events
 

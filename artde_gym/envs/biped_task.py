@@ -12,6 +12,7 @@ import numpy as np
 from artde_gym.arguments import flag, word
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
+from artde_gym.disturbances.ground import GrfPulses
 from artde_gym.envs.options import steps_per_period
 from artde_gym.layout import Field, Layout
 from artde_gym.references.walking import WalkingPattern, hip_height_above_ankle, walking_pattern
@@ -223,6 +224,10 @@ class Walk:
         world.set_friction(realised.get("friction", {}).get("coefficient", FRICTION))
         world.set_gravity(gravity(**realised.get("slope", {})))
         world.scale_masses(realised.get("mass_error", {}).get("factor", 1.0))
+
+    def pulses(self, n: int) -> GrfPulses:
+        """The ground reaction pulses of `n` robots on this walk."""
+        return GrfPulses(n, self.pattern.load_left, TIME_STEP)
 
     def pose(self, realised: Mapping[str, Any]) -> Array:
         """Joint angles (12,) (rad) in which the robot is to settle."""

@@ -72,6 +72,7 @@ STANDARDS: dict[str, Standard] = {
             "push.magnitude": Range(0.0, 60.0, 2.0),
             "payload.mass": Range(0.5, 5.0, 0.25),
             "grf_pulse.magnitude": Range(0.0, 200.0, 10.0),
+            "grf_pulse.share": Range(0.0, 1.0, 0.02),
             "friction.coefficient": Range(0.05, 0.8, 0.05, "smaller"),
             "slope.pitch_deg": Range(0.0, 10.0, 0.5),
             "slope.roll_deg": Range(0.0, 10.0, 0.5),

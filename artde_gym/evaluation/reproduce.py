@@ -41,7 +41,7 @@ class Selection:
 
 ROBOTS: dict[str, Selection] = {
     "biped": Selection(
-        ("S1", "S2", "S3", "S1-L4", "S2-L4", "S3-L4", "S1-GRF"),
+        ("S1", "S2", "S3", "S1-L4", "S2-L4", "S3-L4"),
         ("tde", "atde", ADAPTIVE),
     ),
     "quadrotor": Selection(

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import tempfile
 import weakref
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -183,6 +184,13 @@ class BulletEngine:
         point = self.site(site)
         link = self._links[self._site(site)[0]]
         bullet.applyExternalForce(self._robot, link, force, point, bullet.WORLD_FRAME, physicsClientId=self._client)
+
+    def lift_feet(self, forces: Sequence[float]) -> None:
+        client = self._client
+        for foot, force in zip(self._feet, forces, strict=True):
+            center = bullet.getLinkState(self._robot, foot, computeForwardKinematics=1, physicsClientId=client)[0]
+            lift = (0.0, 0.0, force)
+            bullet.applyExternalForce(self._robot, foot, lift, center, bullet.WORLD_FRAME, physicsClientId=client)
 
     def site(self, name: str) -> Vector:
         link, offset = self._site(name)

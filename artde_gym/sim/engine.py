@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -41,6 +42,10 @@ class World(Protocol):
         Raises:
             RobotError: for a site that the spec does not have.
         """
+        ...
+
+    def lift_feet(self, forces: Sequence[float]) -> None:
+        """Add upward forces (N) at the centers of mass of the feet, one a foot, for the next step only."""
         ...
 
     def foot_loads(self) -> tuple[float, ...]:

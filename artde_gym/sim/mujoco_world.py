@@ -7,6 +7,7 @@ out where something is and to set it is the same in both.
 from __future__ import annotations
 
 import abc
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import mujoco
@@ -41,6 +42,7 @@ class Blueprint:
         model.opt.timestep = time_step
         self.bodies = [model.body(link.name).id for link in spec.links]
         self.base = self.bodies[0]
+        self.feet = [model.body(name).id for name in spec.feet]
         self.payload = model.body(PAYLOAD).id
         self.sites = {name: model.site(name).id for name, _, _ in spec.sites}
         # MuJoCo numbers the coordinates of the base first, and those of joints by the tree
@@ -86,6 +88,11 @@ class MujocoWorld(abc.ABC):
         body = self._blueprint.model.site_bodyid[number]
         arm = data.site_xpos[number] - data.xipos[body]
         self.add_force(body, force, np.cross(arm, force))
+
+    def lift_feet(self, forces: Sequence[float]) -> None:
+        """See `artde_gym.sim.engine.World`."""
+        for foot, force in zip(self._blueprint.feet, forces, strict=True):
+            self.add_force(foot, (0.0, 0.0, force), (0.0, 0.0, 0.0))
 
     def site(self, name: str) -> Vector:
         """As of `artde_gym.sim.engine.Engine`."""
