@@ -263,6 +263,45 @@ KINDS: dict[str, Kind] = {
             (Parameter("offset", "m", -0.3, 0.3, None, "added to the reference position", size=3),),
             robots=("q450",),
         ),
+        Kind(
+            "rotor_inertia",
+            'Rotors of another inertia than the nominal model\'s. It needs `actuator_inertia="rotor"`; `mass_error` '
+            "scales it, too.",
+            (Parameter("inertia", "kg m^2", 0.005, 0.5, None, "reflected to each leg joint, instead of 0.045"),),
+            scalar="inertia",
+            robots=("ojas",),
+        ),
+        Kind(
+            "mass_distribution",
+            "Mass moves between the legs and the rest of the robot, inertia with it; the whole mass stays.",
+            (Parameter("legs", "1", 0.5, 1.5, None, "mass of each link of the legs over the nominal one"),),
+            scalar="legs",
+            robots=("ojas",),
+        ),
+        Kind(
+            "contact",
+            "Softer or stiffer contact of feet and ground.",
+            (
+                Parameter(
+                    "time_constant",
+                    "s",
+                    0.002,
+                    0.05,
+                    None,
+                    "with which the ground pushes a foot out: in MuJoCo of its critically damped contacts (its own is "
+                    "0.005 s), in Bullet 0.001 s over the share of the depth that it corrects in that time (0.0125 s)",
+                ),
+            ),
+            scalar="time_constant",
+            robots=("ojas",),
+        ),
+        Kind(
+            "torque_limit",
+            "Actuators that saturate below the bounds of the action.",
+            (Parameter("limit", "Nm", 1.0, 40.0, None, "largest torque of each joint"),),
+            scalar="limit",
+            robots=("ojas",),
+        ),
     )
 }
 

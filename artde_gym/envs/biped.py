@@ -110,7 +110,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self.observation_layout = task.observation_layout(observe_ground_force)
         self.observation_space = self.observation_layout.box()
         self.action_space = task.ACTION.box()
-        self._low, self._high = self.action_space.low, self.action_space.high
+        self._limit = robot.TORQUE_LIMIT
         self._engine.set_friction(task.FRICTION)
         self._engine.place(walk.position, walk.start)
         self._still = self._settle(walk.start, task.SETTLE_STEPS)
@@ -150,7 +150,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
             raise gym.error.ResetNeeded("the walk is over or has not begun: call reset()")
         action = action_array(action, task.N_JOINTS, "torques (Nm)")
         previous = self._tau
-        events = self._simulate(np.minimum(np.maximum(action, self._low), self._high))
+        events = self._simulate(np.minimum(np.maximum(action, -self._limit), self._limit))
         self._k += 1
         info: dict[str, Any] = {"time_s": self._k * self.control_period}
         observation = self._measure(info)
@@ -192,6 +192,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self._walk.set_up(self._engine, realised)
         self._course = Course(realised, self._walk, self.np_random)
         self._course.start(self._engine)
+        self._limit = task.torque_limit(realised)
         self._pulses = None
         if "grf_pulse" in realised:
             self._pulses = self._walk.pulses(1)

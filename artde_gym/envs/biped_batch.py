@@ -114,6 +114,8 @@ class BipedVectorEnv(BatchEnv):
         self._sensing: dict[int, Sensing] = {}  # where sensors err
         self._readings: dict[int, Array] = {}  # what they measured last
         self._tau = self._previous = np.zeros((num_envs, task.N_JOINTS))
+        self._high = np.full((num_envs, task.N_JOINTS), robot.TORQUE_LIMIT)
+        self._low = -self._high
         first = np.zeros(1, np.int32)
         self._batch.worlds[0].set_friction(task.FRICTION)
         self._batch.place(0, walk.position, walk.start)
@@ -130,6 +132,8 @@ class BipedVectorEnv(BatchEnv):
         restless: dict[int, list[int]] = {}
         for i, realised in drawn.items():
             walk.set_up(batch.worlds[i], realised)
+            self._high[i] = task.torque_limit(realised)
+            self._low[i] = -self._high[i]
             course = self._courses[i] = Course(realised, walk, self._np_random[i])
             course.start(batch.worlds[i])
             self._begin_pulses(i, realised.get("grf_pulse"))

@@ -12,8 +12,9 @@ from __future__ import annotations
 import math
 import tempfile
 import weakref
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,7 @@ BARE_ITERATIONS = 50  # without gears
 GEAR_FORCE = 1e6  # N, more than any gear carries
 PAYLOAD_FORCE = 1e5  # N, likewise
 FAR = 30.0  # m, behind which nothing is drawn
+CONTACT_SHARE = 0.08  # of a foot's depth in the ground that is corrected each time step, Bullet's own
 HOLD_TORQUE = 100.0  # Nm, of the motors that hold joints which nobody actuates
 
 _ORIGIN = (0.0, 0.0, 0.0)
@@ -75,7 +77,8 @@ class BulletEngine:
         self._com = x, y, z = spec.base.com
         self._to_origin = (-x, -y, -z)  # of the base, from its centre of mass
         self._shadow = Shadow(spec)
-        self._mass_factor = 1.0
+        self._scales: tuple[float, dict[str, float], float] = (1.0, {}, 1.0)
+        self._contact_time: float | None = None
         self._friction = math.nan
         self._friction_at: dict[int, float] = {}  # of the contacts in each snapshot
         self._payload: int | None = None  # body
@@ -221,18 +224,31 @@ class BulletEngine:
     def set_gravity(self, gravity: Vector) -> None:
         bullet.setGravity(*gravity, physicsClientId=self._client)
 
-    def scale_masses(self, factor: float) -> None:
-        if factor == self._mass_factor:
+    def set_contact_time(self, time: float | None) -> None:
+        if time == self._contact_time:
             return
+        share = CONTACT_SHARE if time is None else self.time_step / time
+        bullet.setPhysicsEngineParameter(contactERP=share, physicsClientId=self._client)
+        self._contact_time = time
+
+    def scale_masses(
+        self, factor: float, links: Mapping[str, float] = MappingProxyType({}), armature: float = 1.0
+    ) -> None:
+        scales = (factor, dict(links), armature)
+        if scales == self._scales:
+            return
+        rotors = {gear.rotor for gear in self.spec.gears}
         for link in self.spec.links:
+            own = factor * links.get(link.name, 1.0)
+            turning = own * armature if link.name in rotors else own
             bullet.changeDynamics(
                 self._robot,
                 self._links[link.name],
-                mass=factor * link.mass,
-                localInertiaDiagonal=[factor * moment for moment in link.inertia],  # or Bullet makes up its own
+                mass=own * link.mass,
+                localInertiaDiagonal=[turning * moment for moment in link.inertia],  # or Bullet makes up its own
                 physicsClientId=self._client,
             )
-        self._mass_factor = factor
+        self._scales = scales
 
     def set_friction(self, coefficient: float) -> None:
         if coefficient == self._friction:

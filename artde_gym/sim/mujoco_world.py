@@ -7,7 +7,8 @@ out where something is and to set it is the same in both.
 from __future__ import annotations
 
 import abc
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import mujoco
@@ -16,14 +17,14 @@ from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
 from artde_gym.errors import RobotError
-from artde_gym.robots.mjcf import PAYLOAD, mjcf
+from artde_gym.robots.mjcf import CONTACT_TIME, PAYLOAD, mjcf
 from artde_gym.robots.spec import RobotSpec, Vector
 from artde_gym.sim.engine import PAYLOAD_RADIUS
 
 mj: Any = mujoco  # compiled, without type information
 
 STATE = mj.mjtState.mjSTATE_INTEGRATION  # all that the next step depends on
-FIELDS = ("body_mass", "body_inertia", "body_pos", "dof_armature", "pair_friction", "opt.gravity")
+FIELDS = ("body_mass", "body_inertia", "body_pos", "dof_armature", "pair_friction", "pair_solref", "opt.gravity")
 """What worlds may have of their own, by MuJoCo's names; what follows from it comes with `masses_changed`."""
 
 
@@ -59,6 +60,7 @@ class Fields(NamedTuple):
     body_pos: Array
     dof_armature: Array
     pair_friction: Array
+    pair_solref: Array
     gravity: Array
     pushes: Array
 
@@ -70,7 +72,7 @@ class MujocoWorld(abc.ABC):
         self.spec = blueprint.spec
         self.held: Vector | None = None  # where the payload is on the base
         self._blueprint, self._fields = blueprint, fields
-        self._mass_factor = 1.0
+        self._scales: tuple[float, dict[str, float], float] = (1.0, {}, 1.0)
 
     @abc.abstractmethod
     def placed(self) -> Any:
@@ -116,14 +118,21 @@ class MujocoWorld(abc.ABC):
     def set_gravity(self, gravity: Vector) -> None:
         self._fields.gravity[:] = gravity
 
-    def scale_masses(self, factor: float) -> None:
-        if factor == self._mass_factor:
+    def set_contact_time(self, time: float | None) -> None:
+        self._fields.pair_solref[:, 0] = CONTACT_TIME if time is None else time
+
+    def scale_masses(
+        self, factor: float, links: Mapping[str, float] = MappingProxyType({}), armature: float = 1.0
+    ) -> None:
+        scales = (factor, dict(links), armature)
+        if scales == self._scales:
             return
-        self._mass_factor = factor
+        self._scales = scales
         nominal, fields = self._blueprint, self._fields
-        fields.body_mass[nominal.bodies] = factor * nominal.mass[nominal.bodies]
-        fields.body_inertia[nominal.bodies] = factor * nominal.inertia[nominal.bodies]
-        fields.dof_armature[:] = factor * nominal.armature
+        each = np.array([factor * links.get(link.name, 1.0) for link in self.spec.links])
+        fields.body_mass[nominal.bodies] = each * nominal.mass[nominal.bodies]
+        fields.body_inertia[nominal.bodies] = each[:, None] * nominal.inertia[nominal.bodies]
+        fields.dof_armature[:] = (factor * armature) * nominal.armature
         self.masses_changed()
 
     def attach_payload(self, mass: float, position: Vector) -> None:
