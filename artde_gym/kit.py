@@ -20,8 +20,9 @@ from artde_gym.registry import Registry
 from artde_gym.scenarios import Scenario
 
 Capability = Literal[
-    "actuators", "encoders", "feet", "flight", "joints", "mass", "payload", "rotors", "sensors", "sites"
-]
+    "actuators", "armature", "contact", "encoders", "feet", "flight", "joints", "legs", "mass", "payload", "rotors",
+    "sensors", "sites", "torque_limit",
+]  # fmt: skip
 """Properties of a robot, and of its environments, that kinds of disturbances ask for."""
 Harder = Literal["larger", "smaller"]
 

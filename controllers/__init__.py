@@ -21,7 +21,8 @@ def make(name: str, env: Any, **overrides: Any) -> Any:
         name: "tde", "atde", "artde", "artde-robust", "pid", "tde+c", "tde+kd", for the biped "computed-torque", for the
             quadrotor "asmc", "geometric", "indi", or whatever was given to `artde_gym.register_controller`.
         env: the environment that it will drive; its robot decides which policy the name stands for.
-        overrides: gains in place of the preset's, and `preset="thesis"`, `"robust"`, ...; of the quadrotor's two loops
+        overrides: gains in place of the preset's, and `preset="thesis"`, `"robust"`, ...; for the biped's laws also
+            `velocity_cutoff_hz` and `time_base`, see `controllers.biped.make_biped`; of the quadrotor's two loops
             a gain has the suffix `_p` (position) or `_q` (attitude).
 
     Raises:

@@ -6,18 +6,22 @@ from typing import Any
 
 from controllers.encoders import EncoderPolicy
 from controllers.law_table import LAWS
-from controllers.laws.tracking import Array, Memory, Signals
+from controllers.laws.tracking import Array, Memory, Signals, check_positive_number
 from controllers.policies import Plant, TrackingPolicy
 from controllers.presets import preset_gains
 
 
 class LawPolicy(TrackingPolicy):
-    """One of the laws that need nothing but the signals and the sampling period."""
+    """One of the laws that need nothing but the signals and the sampling period.
 
-    def __init__(self, name: str, plant: Plant, gains: Any) -> None:
+    `time_base` is the period L that the law divides by, over the true one.
+    """
+
+    def __init__(self, name: str, plant: Plant, gains: Any, time_base: float = 1.0) -> None:
+        check_positive_number("time_base", time_base)
         self._law, convert = LAWS[name]
-        super().__init__(name, plant, convert(gains, plant.control_period))
-        self._period = plant.control_period
+        self._period = time_base * plant.control_period
+        super().__init__(name, plant, convert(gains, self._period))
 
     def start(self, signals: Signals) -> Memory:
         return self._law.start(self.gains, signals, self._period)
@@ -27,7 +31,13 @@ class LawPolicy(TrackingPolicy):
 
 
 def make_biped(
-    env: Any, *, law: str, preset: str | None = None, velocity_cutoff_hz: float | None = None, **gains: Any
+    env: Any,
+    *,
+    law: str,
+    preset: str | None = None,
+    velocity_cutoff_hz: float | None = None,
+    time_base: float = 1.0,
+    **gains: Any,
 ) -> TrackingPolicy:
     """The policy of a law for a biped's environment, at preset gains with some replaced.
 
@@ -37,6 +47,8 @@ def make_biped(
         preset: name of its gains; None for the law's default.
         velocity_cutoff_hz: with a number, velocities are estimated from the observed angles by a low-pass of this
             bandwidth, as behind encoders; without, the observed velocities are used.
+        time_base: the period L that the law divides by, over the true one; 0.5 halves it, as if the law believed in
+            twice the sampling rate.
         gains: in place of the preset's.
 
     Raises:
@@ -44,7 +56,7 @@ def make_biped(
         GainError: for an unknown gain or a value that is not allowed.
     """
     plant = Plant.of(env)
-    policy = LawPolicy(law, plant, preset_gains(plant.robot, law, preset, plant.action.size, gains))
+    policy = LawPolicy(law, plant, preset_gains(plant.robot, law, preset, plant.action.size, gains), time_base)
     if velocity_cutoff_hz is None:
         return policy
     return EncoderPolicy(policy, plant, velocity_cutoff_hz)

@@ -11,6 +11,7 @@ import typer
 from artde_gym import __version__
 from artde_gym.cli import (
     benchmark,
+    design,
     doctor,
     evaluate,
     frontier,
@@ -44,6 +45,7 @@ app.command()(play.play)
 app.command("list")(listing.list_everything)
 app.command()(benchmark.benchmark)
 app.command()(doctor.doctor)
+app.command()(design.design)
 
 
 def main() -> None:

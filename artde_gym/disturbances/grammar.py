@@ -77,7 +77,9 @@ class Disturbances:
         realised: dict[str, Any] = {}
         for name, entry in self.entries:
             values = {
-                parameter.name: _draw(entry[parameter.name], parameter, rng) for parameter in KINDS[name].parameters
+                parameter.name: _draw(entry[parameter.name], parameter, rng)
+                for parameter in KINDS[name].parameters
+                if parameter.name in entry
             }
             if KINDS[name].repeated:
                 realised.setdefault(name, []).append(values)
@@ -147,8 +149,13 @@ def _parse_entry(
     for key in given:
         if key not in names:
             raise DisturbanceError(f"{path} key", key, among(key, names))
+    chosen = [name for name in kind.one_of if name in given]
+    if kind.one_of and len(chosen) != 1:
+        raise DisturbanceError(path, dict(given), f"exactly one of {', '.join(kind.one_of)}")
     entry = {}
     for name, parameter in names.items():
+        if name in kind.one_of and name not in chosen:
+            continue
         field = f"{path}.{name}"
         if name not in given and parameter.default is None:
             raise DisturbanceError(field, None, f"{allowed(parameter)} (it has no default)")

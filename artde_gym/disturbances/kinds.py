@@ -42,6 +42,7 @@ class Kind:
         requires: the capability of a robot that it takes.
         scalar: the parameter that a bare number stands for.
         repeated: whether it takes a list of entries. Where it names a joint, "all" stands for one entry a joint.
+        one_of: parameters of which exactly one is given; the others are absent.
     """
 
     name: str
@@ -50,6 +51,7 @@ class Kind:
     requires: Capability
     scalar: str | None = None
     repeated: bool = False
+    one_of: tuple[str, ...] = ()
 
     def default_of(self, parameter: Parameter, robot: str | None) -> Any:
         """Return a parameter's default for a robot, or for none in particular."""
@@ -64,6 +66,7 @@ class Kind:
 ALL = "all"
 NEVER = 1e9  # s
 SHAPES = ("half_sine", "double_hump")
+TRIGGERS = ("contact", "plan")
 
 
 def _word(name: str, words: tuple[str, ...] | str, default: str | None, text: str) -> Parameter:
@@ -122,15 +125,25 @@ KINDS: dict[str, Kind] = {
         ),
         Kind(
             "grf_pulse",
-            "An extra upward force on the foot that lands, from the moment of its contact: the ground reaction model "
-            "of the thesis. The engine has contact forces of its own, so this counts them twice; off by default.",
+            "An extra upward force on the foot that lands, through its center of mass, one pulse a landing: the ground "
+            "reaction model of the thesis. The engine has contact forces of its own, so this counts them twice; off by "
+            "default. Exactly one of `magnitude` and `share` is given.",
             (
                 _word("shape", SHAPES, "half_sine", "A sin(pi x), or A (sin(pi x) + q sin(3 pi x)), x = t / duration"),
-                Parameter("magnitude", "N", 0.0, 500.0, 60.0, "A"),
+                Parameter("magnitude", "N", 0.0, 500.0, None, "A"),
+                Parameter("share", "1", 0.0, 5.0, None, "A over the weight of the robot as specified, 88.15 N"),
                 Parameter("duration", "s", 0.005, 2.0, 0.1, "how long; for a double hump the stance, about 1 s"),
                 Parameter("q", "1", -1.0, 1.0, 0.4, "depth between the humps"),
+                _word(
+                    "trigger",
+                    TRIGGERS,
+                    "contact",
+                    "what starts a pulse: a foot's first contact after 0.25 s of its planned swing in the air, or the "
+                    "instant at which the plan puts load on it again",
+                ),
             ),
             scalar="magnitude",
+            one_of=("magnitude", "share"),
             requires="feet",
         ),
         Kind(
@@ -262,6 +275,45 @@ KINDS: dict[str, Kind] = {
             (Parameter("offset", "m", -0.3, 0.3, None, "added to the reference position", size=3),),
             requires="flight",
         ),
+        Kind(
+            "rotor_inertia",
+            'Rotors of another inertia than the nominal model\'s. It needs `actuator_inertia="rotor"`; `mass_error` '
+            "scales it, too.",
+            (Parameter("inertia", "kg m^2", 0.005, 0.5, None, "reflected to each leg joint, instead of 0.045"),),
+            scalar="inertia",
+            requires="armature",
+        ),
+        Kind(
+            "mass_distribution",
+            "Mass moves between the legs and the rest of the robot, inertia with it; the whole mass stays.",
+            (Parameter("legs", "1", 0.5, 1.5, None, "mass of each link of the legs over the nominal one"),),
+            scalar="legs",
+            requires="legs",
+        ),
+        Kind(
+            "contact",
+            "Softer or stiffer contact of feet and ground.",
+            (
+                Parameter(
+                    "time_constant",
+                    "s",
+                    0.002,
+                    0.05,
+                    None,
+                    "with which the ground pushes a foot out: in MuJoCo of its critically damped contacts (its own is "
+                    "0.005 s), in Bullet 0.001 s over the share of the depth that it corrects in that time (0.0125 s)",
+                ),
+            ),
+            scalar="time_constant",
+            requires="contact",
+        ),
+        Kind(
+            "torque_limit",
+            "Actuators that saturate below the bounds of the action.",
+            (Parameter("limit", "Nm", 1.0, 40.0, None, "largest torque of each joint"),),
+            scalar="limit",
+            requires="torque_limit",
+        ),
     )
 }
 
@@ -302,7 +354,9 @@ def page() -> str:
         lines += [f"## `{kind.name}`{marks}", "", kind.text, "", "| parameter | unit | allowed | default | meaning |"]
         lines += ["|---|---|---|---|---|"]
         for parameter in kind.parameters:
-            default = "required" if parameter.default is None else f"`{parameter.default}`"
+            default = f"`{parameter.default}`"
+            if parameter.default is None:
+                default = "one of these" if parameter.name in kind.one_of else "required"
             default += "".join(f"; {robot}: `{value}`" for robot, value in other_defaults(kind, parameter).items())
             text = parameter.text + (" (what a bare number stands for)" if parameter.name == kind.scalar else "")
             row = (f"`{parameter.name}`", parameter.unit, allowed(parameter), default, text)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from artde_gym.arguments import action_array, known_arguments, seed_number
 from artde_gym.arrays import Array
-from artde_gym.disturbances.ground import LOADED
+from artde_gym.disturbances.ground import LOADED, GrfPulses
 from artde_gym.disturbances.schedule import Schedule
 from artde_gym.envs.biped_course import Course
 from artde_gym.envs.closed import CLOSED
@@ -120,7 +120,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self.observation_layout = task.observation_layout(observe_ground_force)
         self.observation_space = self.observation_layout.box()
         self.action_space = task.ACTION.box()
-        self._low, self._high = self.action_space.low, self.action_space.high
+        self._limit = robot.TORQUE_LIMIT
         self._engine.set_friction(task.FRICTION)
         self._engine.place(walk.position, walk.start)
         self._still = self._settle(walk.start, task.SETTLE_STEPS)
@@ -130,6 +130,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self._sample({})
         warn_of_idle(self._disturbances, self._last * self.control_period)
         self._course = Course(self._realised, walk, self.np_random)
+        self._pulses: GrfPulses | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
         """Start a walk; `options` are those of the class' documentation.
@@ -164,7 +165,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
             raise gym.error.ResetNeeded("the walk is over or has not begun: call reset()")
         action = action_array(action, task.N_JOINTS, "torques (Nm)")
         previous = self._tau
-        events = self._simulate(np.minimum(np.maximum(action, self._low), self._high))
+        events = self._simulate(np.minimum(np.maximum(action, -self._limit), self._limit))
         self._k += 1
         observation = self._measure()
         terms = self._reward_terms(previous)
@@ -207,6 +208,11 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self._walk.set_up(self._engine, realised)
         self._course = Course(realised, self._walk, self.np_random)
         self._course.start(self._engine)
+        self._limit = task.torque_limit(realised)
+        self._pulses = None
+        if "grf_pulse" in realised:
+            self._pulses = self._walk.pulses(1)
+            self._pulses.begin(0, realised["grf_pulse"], self.nominal_robot)
         steps = task.settling(realised)
         tau = self._settle(self._walk.pose(realised), steps) if steps else self._still
         self._course.settled(tau)
@@ -228,7 +234,11 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         first = self.elapsed
         course.begin(command)
         for step in range(first, first + self._walk.substeps):
-            engine.step(course.act(step, engine, events))
+            tau = course.act(step, engine, events)
+            if self._pulses is not None:
+                loads = np.array([engine.foot_loads()])
+                engine.lift_feet(self._pulses.forces(loads, np.array([step]))[0].tolist())
+            engine.step(tau)
         self._tau = course.applied()
         return events
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from artde_gym.arguments import known_arguments
 from artde_gym.arrays import Array, each
 from artde_gym.disturbances import Disturbances
-from artde_gym.disturbances.ground import LOADED
+from artde_gym.disturbances.ground import LOADED, GrfPulses
 from artde_gym.disturbances.schedule import NEVER
 from artde_gym.disturbances.sensing import Sensing
 from artde_gym.envs.batch import BatchEnv, Mask
@@ -126,9 +126,13 @@ class BipedVectorEnv(BatchEnv):
         self._batch = make_batch("mujoco", walk.robot, num_envs, task.TIME_STEP, threads)
         self._courses: dict[int, Course] = {}
         self._wakes = np.full(num_envs, NEVER)  # time step of each walk in which its course is to be asked again
+        self._pulses: GrfPulses | None = None
+        self._pulsed = np.zeros(num_envs, np.bool_)  # robots with ground reaction pulses
         self._sensing: dict[int, Sensing] = {}  # where sensors err
         self._readings: dict[int, Array] = {}  # what they measured last
         self._tau = self._previous = np.zeros((num_envs, task.N_JOINTS))
+        self._high = np.full((num_envs, task.N_JOINTS), robot.TORQUE_LIMIT)
+        self._low = -self._high
         first = np.zeros(1, np.int32)
         self._batch.worlds[0].set_friction(task.FRICTION)
         self._batch.place(0, walk.position, walk.start)
@@ -145,8 +149,11 @@ class BipedVectorEnv(BatchEnv):
         restless: dict[int, list[int]] = {}
         for i, realised in drawn.items():
             walk.set_up(batch.worlds[i], realised)
+            self._high[i] = task.torque_limit(realised)
+            self._low[i] = -self._high[i]
             course = self._courses[i] = Course(realised, walk, self._np_random[i])
             course.start(batch.worlds[i])
+            self._begin_pulses(i, realised.get("grf_pulse"))
             self._wakes[i] = course.wakes(0)
             self._sensing.pop(i, None)
             if course.sensing is not None:
@@ -159,6 +166,13 @@ class BipedVectorEnv(BatchEnv):
             self._tau[some] = self._settle(np.array(some, np.int32), poses, steps)
         for i in drawn:
             self._courses[i].settled(self._tau[i].copy())
+
+    def _begin_pulses(self, i: int, entry: Mapping[str, Any] | None) -> None:
+        if entry is not None and self._pulses is None:
+            self._pulses = self._walk.pulses(self.num_envs)
+        if self._pulses is not None:
+            self._pulses.begin(i, entry, self.nominal_robot)
+        self._pulsed[i] = entry is not None
 
     def _settle(self, some: NDArray[np.int32], poses: Array, steps: int) -> Array:
         """Let some robots stand still in `poses` (n, 12) (rad) for so many time steps; returns their last torques."""
@@ -174,12 +188,13 @@ class BipedVectorEnv(BatchEnv):
         self._previous, self._tau = self._tau, commands
         steps = self._walk.substeps
         awake = goes_on & (self._wakes < (self._k + 1) * steps)
-        if not awake.any():
+        busy = awake | (goes_on & self._pulsed)
+        if not busy.any():
             self._step(commands, goes_on, steps)
             return {}
         if steps > 1:
-            self._step(commands, goes_on & ~awake, steps)
-        return self._disturbed(commands, awake, goes_on if steps == 1 else awake)
+            self._step(commands, goes_on & ~busy, steps)
+        return self._disturbed(commands, awake, goes_on if steps == 1 else busy)
 
     def _disturbed(self, commands: Array, awake: Mask, some: Mask) -> dict[int, list[str]]:
         """Advance `some` robots by a control period in which something happens to those that are `awake`.
@@ -194,6 +209,9 @@ class BipedVectorEnv(BatchEnv):
         for step in range(steps):
             for i, course, first in happening:
                 torques[i] = course.act(first + step, self._batch.worlds[i], events[i])
+            if self._pulses is not None:
+                forces = self._pulses.forces(self._batch.foot_loads(), self._k * steps + step)
+                self._batch.lift_feet(forces * some[:, None])
             self._step(torques, some, 1)
         for i, course, first in happening:
             commands[i] = course.applied()

@@ -9,13 +9,10 @@ import numpy as np
 
 from artde_gym.arrays import Array
 from artde_gym.disturbances.actuation import Actuation
-from artde_gym.disturbances.ground import GrfPulse
 from artde_gym.disturbances.schedule import Schedule
 from artde_gym.disturbances.sensing import Sensing
 from artde_gym.robots.ojas.task import OBSERVATION, TIME_STEP, Walk
 from artde_gym.sim.engine import World
-
-FOOT_SITES = ("left_foot", "right_foot")
 
 
 class Course:
@@ -34,7 +31,6 @@ class Course:
     def __init__(self, realised: Mapping[str, Any], walk: Walk, rng: np.random.Generator) -> None:
         kinds = realised.keys()
         self.schedule = Schedule(realised, TIME_STEP)
-        self._pulse = GrfPulse(realised["grf_pulse"], TIME_STEP) if "grf_pulse" in kinds else None
         joints = walk.nominal_robot.actuated
         self._actuation = None if kinds.isdisjoint(Actuation.KINDS) else Actuation(realised, joints, TIME_STEP)
         self.sensing = (
@@ -54,7 +50,7 @@ class Course:
 
     def wakes(self, step: int) -> int:
         """The first time step from `step` on in which commanded torques are not all that happens."""
-        return step if self._actuation is not None or self._pulse is not None else self.schedule.next(step)
+        return step if self._actuation is not None else self.schedule.next(step)
 
     def begin(self, command: Array) -> None:
         """A control period begins with torques `command` (n,) (Nm) within their bounds."""
@@ -64,10 +60,6 @@ class Course:
     def act(self, step: int, world: World, events: list[str]) -> Array:
         """Disturb a world for a time step; returns the torques (n,) (Nm) that act, and adds to `events`."""
         events += self.schedule.apply(step, world)
-        if self._pulse is not None:
-            for site, force in zip(FOOT_SITES, self._pulse.forces(world.foot_loads()), strict=True):
-                if force:
-                    world.push(site, (0.0, 0.0, force))
         if self._actuation is None:
             return self._target
         applied = self._actuation.advance(self._target, step)

@@ -10,6 +10,7 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from html import escape
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from numpy.typing import ArrayLike
 from artde_gym.arrays import Array
 from artde_gym.palette import Look
 
+_ASSETS = Path(__file__).parent / "assets"
 COLUMNS = 220
 LEFT, RIGHT, TOP, BOTTOM = 64, 12, 12, 40  # margins of the drawing, in its own units
 TICKS = 5
@@ -193,6 +195,13 @@ class Chart:
             f'<svg role="img" aria-label="{name}" viewBox="0 0 {self.width} {self.height}"><title>{name}</title>'
             f"{''.join(self._parts)}</svg>"
         )
+
+    def file(self) -> str:
+        """The chart as an SVG file of its own, in the colors of the reports."""
+        style = "".join((_ASSETS / name).read_text(encoding="utf-8") for name in ("style.css", "chart.css"))
+        size = f'xmlns="http://www.w3.org/2000/svg" width="{2 * self.width}" height="{2 * self.height}"'
+        whole = self.svg().replace("<svg ", f"<svg {size} ", 1)
+        return whole.replace("</title>", f"</title><style><![CDATA[{style}]]></style>", 1)
 
     def _points(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         across = LEFT + self.x.place(x) * (self.width - LEFT - RIGHT)

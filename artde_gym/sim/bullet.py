@@ -12,7 +12,9 @@ from __future__ import annotations
 import math
 import tempfile
 import weakref
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,6 +37,7 @@ BARE_ITERATIONS = 50  # without gears
 GEAR_FORCE = 1e6  # N, more than any gear carries
 PAYLOAD_FORCE = 1e5  # N, likewise
 FAR = 30.0  # m, behind which nothing is drawn
+CONTACT_SHARE = 0.08  # of a foot's depth in the ground that is corrected each time step, Bullet's own
 HOLD_TORQUE = 100.0  # Nm, of the motors that hold joints which nobody actuates
 
 _ORIGIN = (0.0, 0.0, 0.0)
@@ -82,7 +85,8 @@ class BulletEngine:
         self._com = x, y, z = spec.base.com
         self._to_origin = (-x, -y, -z)  # of the base, from its centre of mass
         self._shadow = Shadow(spec)
-        self._mass_factor = 1.0
+        self._scales: tuple[float, dict[str, float], float] = (1.0, {}, 1.0)
+        self._contact_time: float | None = None
         self._friction = math.nan
         self._gravity: Vector = (0.0, 0.0, -9.81)
         self._snapshots: list[_Snapshot] = []
@@ -171,7 +175,7 @@ class BulletEngine:
         return {
             "built": (self.spec, self.time_step),
             "snapshots": [(saved.friction, saved.world) for saved in self._snapshots],
-            "set": (self._gravity, self._mass_factor, self._friction),
+            "set": (self._gravity, self._scales, self._contact_time, self._friction),
             "payload": payload,
             "world": self._world(),
         }
@@ -181,9 +185,10 @@ class BulletEngine:
         for friction, world in state["snapshots"]:
             self._load(friction, world)
             self.snapshot()
-        gravity, factor, friction = state["set"]
+        gravity, scales, contact_time, friction = state["set"]
         self.set_gravity(gravity)
-        self.scale_masses(factor)
+        self.scale_masses(*scales)
+        self.set_contact_time(contact_time)
         if state["payload"] is not None:
             mass, position, held = state["payload"]
             self.attach_payload(mass, position)
@@ -237,6 +242,13 @@ class BulletEngine:
         link = self._links[self._site(site)[0]]
         bullet.applyExternalForce(self._robot, link, force, point, bullet.WORLD_FRAME, physicsClientId=self._client)
 
+    def lift_feet(self, forces: Sequence[float]) -> None:
+        client = self._client
+        for foot, force in zip(self._feet, forces, strict=True):
+            center = bullet.getLinkState(self._robot, foot, computeForwardKinematics=1, physicsClientId=client)[0]
+            lift = (0.0, 0.0, force)
+            bullet.applyExternalForce(self._robot, foot, lift, center, bullet.WORLD_FRAME, physicsClientId=client)
+
     def site(self, name: str) -> Vector:
         link, offset = self._site(name)
         origin, quat = self._link_frame(link)
@@ -267,18 +279,31 @@ class BulletEngine:
         bullet.setGravity(*gravity, physicsClientId=self._client)
         self._gravity = gravity
 
-    def scale_masses(self, factor: float) -> None:
-        if factor == self._mass_factor:
+    def set_contact_time(self, time: float | None) -> None:
+        if time == self._contact_time:
             return
+        share = CONTACT_SHARE if time is None else self.time_step / time
+        bullet.setPhysicsEngineParameter(contactERP=share, physicsClientId=self._client)
+        self._contact_time = time
+
+    def scale_masses(
+        self, factor: float, links: Mapping[str, float] = MappingProxyType({}), armature: float = 1.0
+    ) -> None:
+        scales = (factor, dict(links), armature)
+        if scales == self._scales:
+            return
+        rotors = {gear.rotor for gear in self.spec.gears}
         for link in self.spec.links:
+            own = factor * links.get(link.name, 1.0)
+            turning = own * armature if link.name in rotors else own
             bullet.changeDynamics(
                 self._robot,
                 self._links[link.name],
-                mass=factor * link.mass,
-                localInertiaDiagonal=[factor * moment for moment in link.inertia],  # or Bullet makes up its own
+                mass=own * link.mass,
+                localInertiaDiagonal=[turning * moment for moment in link.inertia],  # or Bullet makes up its own
                 physicsClientId=self._client,
             )
-        self._mass_factor = factor
+        self._scales = scales
 
     def set_friction(self, coefficient: float) -> None:
         if coefficient == self._friction:

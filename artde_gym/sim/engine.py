@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -43,6 +45,10 @@ class World(Protocol):
         """
         ...
 
+    def lift_feet(self, forces: Sequence[float]) -> None:
+        """Add upward forces (N) at the centers of mass of the feet, one a foot, for the next step only."""
+        ...
+
     def foot_loads(self) -> tuple[float, ...]:
         """Normal force of the ground on each foot during the last step (N): z of `ground_forces`, and cheaper."""
         ...
@@ -58,8 +64,24 @@ class World(Protocol):
         """Set the acceleration of free fall (m/s^2, world axes)."""
         ...
 
-    def scale_masses(self, factor: float) -> None:
-        """Set mass and inertia of every link, and armature, to so many times the spec's; a payload keeps its own."""
+    def scale_masses(
+        self, factor: float, links: Mapping[str, float] = MappingProxyType({}), armature: float = 1.0
+    ) -> None:
+        """Set mass and inertia of every link, and armature, to `factor` times the spec's; a payload keeps its own.
+
+        Args:
+            factor: of everything.
+            links: name -> further factor of a link's mass and inertia; 1 for any other.
+            armature: further factor of the armature.
+        """
+        ...
+
+    def set_contact_time(self, time: float | None) -> None:
+        """Set the time constant (s) with which the ground pushes a foot out; None for the engine's own.
+
+        MuJoCo: of its soft contacts, which are critically damped (its own is 0.005 s). Bullet: one time step over the
+        share of the depth that it corrects in each (its own is 0.0125 s).
+        """
         ...
 
     def attach_payload(self, mass: float, position: Vector) -> None:

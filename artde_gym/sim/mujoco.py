@@ -49,6 +49,7 @@ class MujocoEngine(MujocoWorld):
         self._model = model = blueprint.model
         self._data = data = mj.MjData(model)
         fields = (model.body_mass, model.body_inertia, model.body_pos, model.dof_armature, model.pair_friction)
+        fields += (model.pair_solref,)
         super().__init__(blueprint, Fields(*fields, model.opt.gravity, data.xfrc_applied))
         # views into MuJoCo's memory
         self._q = data.qpos[7:]

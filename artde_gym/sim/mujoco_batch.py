@@ -65,6 +65,7 @@ class MujocoBatch:
         self._place = mj.MjData(blueprint.model)
         self._pushes = batch.bind("xfrc_applied")
         self._pushed: list[int] = []  # worlds with forces that the next step takes up
+        self._lifted = False  # whether feet may have such forces in any world
         fields = [*map(batch.expand, FIELDS), self._pushes]
         self._friction = fields[FIELDS.index("pair_friction")]
         self.worlds = [_Row(blueprint, Fields(*(field[i] for field in fields)), self, i) for i in range(n)]
@@ -128,6 +129,17 @@ class MujocoBatch:
         if self._pushed:
             self._pushes[self._pushed] = 0.0
             self._pushed = []
+        if self._lifted:
+            self._pushes[:, self._blueprint.feet, 2] = 0.0
+            self._lifted = False
+
+    def lift_feet(self, forces: Array) -> None:
+        """Add upward forces (n, feet) (N) at the centers of mass of the feet, for the next step only.
+
+        A world that has a force must be among those of the next step.
+        """
+        self._pushes[:, self._blueprint.feet, 2] += forces
+        self._lifted = True
 
     def foot_loads(self) -> Array:
         """Normal forces on the feet during the last step (n, feet) (N); a view."""

@@ -7,6 +7,8 @@ out where something is and to set it is the same in both.
 from __future__ import annotations
 
 import abc
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import mujoco
@@ -15,14 +17,14 @@ from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
 from artde_gym.errors import RobotError
-from artde_gym.multibody.mjcf import PAYLOAD, mjcf
+from artde_gym.multibody.mjcf import CONTACT_TIME, PAYLOAD, mjcf
 from artde_gym.multibody.spec import RobotSpec, Vector
 from artde_gym.sim.engine import PAYLOAD_RADIUS
 
 mj: Any = mujoco  # compiled, without type information
 
 STATE = mj.mjtState.mjSTATE_INTEGRATION  # all that the next step depends on
-FIELDS = ("body_mass", "body_inertia", "body_pos", "dof_armature", "pair_friction", "opt.gravity")
+FIELDS = ("body_mass", "body_inertia", "body_pos", "dof_armature", "pair_friction", "pair_solref", "opt.gravity")
 """What worlds may have of their own, by MuJoCo's names; what follows from it comes with `masses_changed`."""
 
 
@@ -41,6 +43,7 @@ class Blueprint:
         model.opt.timestep = time_step
         self.bodies = [model.body(link.name).id for link in spec.links]
         self.base = self.bodies[0]
+        self.feet = [model.body(name).id for name in spec.feet]
         self.payload = model.body(PAYLOAD).id
         self.sites = {name: model.site(name).id for name, _, _ in spec.sites}
         # MuJoCo numbers the coordinates of the base first, and those of joints by the tree
@@ -57,6 +60,7 @@ class Fields(NamedTuple):
     body_pos: Array
     dof_armature: Array
     pair_friction: Array
+    pair_solref: Array
     gravity: Array
     pushes: Array
 
@@ -68,7 +72,7 @@ class MujocoWorld(abc.ABC):
         self.spec = blueprint.spec
         self.held: Vector | None = None  # where the payload is on the base
         self._blueprint, self._fields = blueprint, fields
-        self._mass_factor = 1.0
+        self._scales: tuple[float, dict[str, float], float] = (1.0, {}, 1.0)
 
     @abc.abstractmethod
     def placed(self) -> Any:
@@ -86,6 +90,11 @@ class MujocoWorld(abc.ABC):
         body = self._blueprint.model.site_bodyid[number]
         arm = data.site_xpos[number] - data.xipos[body]
         self.add_force(body, force, np.cross(arm, force))
+
+    def lift_feet(self, forces: Sequence[float]) -> None:
+        """See `artde_gym.sim.engine.World`."""
+        for foot, force in zip(self._blueprint.feet, forces, strict=True):
+            self.add_force(foot, (0.0, 0.0, force), (0.0, 0.0, 0.0))
 
     def site(self, name: str) -> Vector:
         """As of `artde_gym.sim.engine.Engine`."""
@@ -109,14 +118,21 @@ class MujocoWorld(abc.ABC):
     def set_gravity(self, gravity: Vector) -> None:
         self._fields.gravity[:] = gravity
 
-    def scale_masses(self, factor: float) -> None:
-        if factor == self._mass_factor:
+    def set_contact_time(self, time: float | None) -> None:
+        self._fields.pair_solref[:, 0] = CONTACT_TIME if time is None else time
+
+    def scale_masses(
+        self, factor: float, links: Mapping[str, float] = MappingProxyType({}), armature: float = 1.0
+    ) -> None:
+        scales = (factor, dict(links), armature)
+        if scales == self._scales:
             return
-        self._mass_factor = factor
+        self._scales = scales
         nominal, fields = self._blueprint, self._fields
-        fields.body_mass[nominal.bodies] = factor * nominal.mass[nominal.bodies]
-        fields.body_inertia[nominal.bodies] = factor * nominal.inertia[nominal.bodies]
-        fields.dof_armature[:] = factor * nominal.armature
+        each = np.array([factor * links.get(link.name, 1.0) for link in self.spec.links])
+        fields.body_mass[nominal.bodies] = each * nominal.mass[nominal.bodies]
+        fields.body_inertia[nominal.bodies] = each[:, None] * nominal.inertia[nominal.bodies]
+        fields.dof_armature[:] = (factor * armature) * nominal.armature
         self.masses_changed()
 
     def settings(self) -> dict[str, Any]:
@@ -124,16 +140,24 @@ class MujocoWorld(abc.ABC):
         fields = self._fields
         mass = float(fields.body_mass[self._blueprint.payload])
         friction, gravity = fields.pair_friction.copy(), fields.gravity.copy()
-        return {"factor": self._mass_factor, "payload": (mass, self.held), "friction": friction, "gravity": gravity}
+        solref = fields.pair_solref.copy()
+        return {
+            "scales": self._scales,
+            "payload": (mass, self.held),
+            "friction": friction,
+            "gravity": gravity,
+            "solref": solref,
+        }
 
     def set_up(self, settings: dict[str, Any]) -> None:
         """Make this world as another one was."""
-        self.scale_masses(settings["factor"])
+        self.scale_masses(*settings["scales"])
         mass, place = settings["payload"]
         if place is not None:
             MujocoWorld.attach_payload(self, mass, place)
         self._fields.pair_friction[:] = settings["friction"]
         self._fields.gravity[:] = settings["gravity"]
+        self._fields.pair_solref[:] = settings["solref"]
 
     def attach_payload(self, mass: float, position: Vector) -> None:
         self.held = position

@@ -43,3 +43,41 @@ def tde_is_valid(inertia: NDArray[np.floating[Any]], m_bar: Inertia) -> NDArray[
     """Whether all eigenvalues lie inside (0, 2), (...)."""
     eigenvalues = tde_eigenvalues(inertia, m_bar)
     return np.all((eigenvalues > 0) & (eigenvalues < 2), axis=-1)
+
+
+def largest_m_bar(inertia: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """Compute the number m_bar below which all eigenvalues lie inside (0, 2), (...): twice the smallest of M's."""
+    return 2.0 * np.linalg.eigvalsh(np.asarray(inertia, dtype=np.float64))[..., 0]
+
+
+def largest_joint_m_bar(inertia: NDArray[np.floating[Any]], m_bar: Inertia) -> NDArray[np.floating[Any]]:
+    """Compute the m_bar of each joint below which all eigenvalues lie inside (0, 2), the others' as given, (..., n).
+
+    For a diagonal m_bar the condition is that 2 m_bar^-1 - M^-1 be positive definite. With A = M^-1 and S that matrix
+    without joint i, the Schur complement gives m_i < 2 / (A_ii + A_io S^-1 A_oi). It is zero where the other joints
+    alone leave the range, and NaN for an m_bar with products of inertia, which is not one number a joint.
+
+    Raises:
+        GainError: for an m_bar that does not fit the inertia.
+    """
+    tde_eigenvalues(inertia, m_bar)  # refuses what does not fit
+    n = inertia.shape[-1]
+    nominal = np.asarray(m_bar, dtype=np.float64)
+    if nominal.ndim == 2:
+        if np.any(nominal != np.diag(np.diagonal(nominal))):
+            return np.full(inertia.shape[:-1], np.nan)
+        nominal = np.diagonal(nominal)
+    inverse = np.linalg.inv(np.asarray(inertia, dtype=np.float64))
+    diagonal = np.diag(2.0 / np.broadcast_to(nominal, n))
+    return np.stack([_largest_of_joint(inverse, diagonal - inverse, i) for i in range(n)], axis=-1)
+
+
+def _largest_of_joint(inverse: NDArray[Any], gap: NDArray[Any], joint: int) -> NDArray[np.floating[Any]]:
+    """One joint's bound (...), from M^-1 and 2 m_bar^-1 - M^-1 (..., n, n)."""
+    others = [i for i in range(inverse.shape[-1]) if i != joint]
+    rest = gap[..., others, :][..., others]
+    coupling = inverse[..., others, joint]
+    allowed = np.linalg.eigvalsh(rest)[..., 0] > 0 if others else np.ones(inverse.shape[:-2], np.bool_)
+    safe = np.where(allowed[..., None, None], rest, np.eye(len(others)))
+    taken = np.sum(coupling * np.linalg.solve(safe, coupling[..., None])[..., 0], axis=-1)
+    return np.where(allowed, 2.0 / (inverse[..., joint, joint] + taken), 0.0)

@@ -17,11 +17,11 @@ from gymnasium.utils.env_checker import check_env
 import artde_gym  # noqa: F401  (registers the environments)
 import controllers
 from artde_gym.disturbances import Disturbances
-from artde_gym.disturbances.ground import AIRBORNE, GrfPulse
+from artde_gym.disturbances.ground import AIRBORNE, GrfPulses
 from artde_gym.disturbances.schedule import EVENTS
 from artde_gym.multibody.dynamics import RigidBodyTree
 from artde_gym.multibody.spec import RobotSpec
-from artde_gym.robots.ojas.model import HIP_OFFSET, TOTAL_MASS, ojas
+from artde_gym.robots.ojas.model import HIP_OFFSET, SIDES, TOTAL_MASS, ojas
 from artde_gym.sim.bullet import bullet
 from artde_gym.sim.engine import Engine, State
 from artde_gym.sim.factory import EngineName, make_engine
@@ -99,11 +99,17 @@ class Recorder:
         self.pushes: dict[int, list[tuple[str, np.ndarray]]] = {}
         self.torques: list[np.ndarray] = []
         self.loads: list[tuple[float, ...]] = []  # after each step
-        push, step, loads = engine.push, engine.step, engine.foot_loads
+        push, lift, step, loads = engine.push, engine.lift_feet, engine.step, engine.foot_loads
 
         def note_push(site: str, force: POINT) -> None:
             self.pushes.setdefault(len(self.torques), []).append((site, np.array(force)))
             push(site, force)
+
+        def note_lift(forces: list[float]) -> None:
+            lifted = [(f"{side}_foot", np.array([0.0, 0.0, f])) for side, f in zip(SIDES, forces, strict=True) if f]
+            if lifted:
+                self.pushes.setdefault(len(self.torques), []).extend(lifted)
+            lift(forces)
 
         def note_step(tau: np.ndarray) -> None:
             self.torques.append(tau.copy())
@@ -111,6 +117,7 @@ class Recorder:
             self.loads.append(loads())
 
         monkeypatch.setattr(engine, "push", note_push)
+        monkeypatch.setattr(engine, "lift_feet", note_lift)
         monkeypatch.setattr(engine, "step", note_step)
 
     def clear(self) -> None:
@@ -361,9 +368,11 @@ def test_attaching_a_payload_makes_no_jump(engine_name: EngineName) -> None:
 
 
 def pulses(loads: list[float], **entry: Any) -> np.ndarray:
-    """Force on the left foot at each step of a sequence of its loads; the right foot stands."""
-    pulse = GrfPulse(realise({"grf_pulse": entry})["grf_pulse"], DT)
-    forces = np.array([pulse.forces((load, 50.0)) for load in loads])
+    """Force on the left foot at each step of a sequence of its loads, as planned; the right foot stands."""
+    given = entry if "share" in entry else {"magnitude": 60.0, **entry}
+    pulse = GrfPulses(1, np.array([0.0 if load == 0 else 0.5 for load in loads]), DT)
+    pulse.begin(0, realise({"grf_pulse": given})["grf_pulse"], ojas())
+    forces = np.array([pulse.forces(np.array([[load, 50.0]]), np.array([step]))[0] for step, load in enumerate(loads)])
     assert not forces[:, 1].any()
     return forces[:, 0]
 
@@ -389,10 +398,10 @@ def test_a_landing_starts_one_pulse_of_the_right_impulse(entry: dict[str, Any], 
 
 def test_flicker_of_the_load_starts_no_pulse() -> None:
     assert not pulses([40.0] * 20 + ([0.0] * (SWING - 1) + [40.0]) * 5 + [40.0] * 50).any()
-    once = pulses([0.0] * (SWING + 10) + [40.0] * 200)
-    flickering = pulses([0.0] * (SWING + 10) + [40.0, 0.0, 0.0, 40.0] * 50)
+    once = pulses([40.0] + [0.0] * (SWING + 10) + [40.0] * 200)
+    flickering = pulses([40.0] + [0.0] * (SWING + 10) + [40.0, 0.0, 0.0, 40.0] * 50)
     np.testing.assert_array_equal(flickering, once)  # neither cut short nor started again
-    twice = pulses(([0.0] * (SWING + 10) + [40.0] * 200) * 2)
+    twice = pulses(([40.0] + [0.0] * (SWING + 10) + [40.0] * 200) * 2)
     np.testing.assert_allclose(twice, np.tile(once, 2), atol=1e-9)
 
 

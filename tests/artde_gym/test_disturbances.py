@@ -71,9 +71,18 @@ def values(parameter: Parameter) -> st.SearchStrategy[Any]:
 
 
 def entry(kind: Kind) -> st.SearchStrategy[dict[str, Any]]:
-    required = {p.name: values(p) for p in kind.parameters if p.default is None}
-    optional = {p.name: values(p) for p in kind.parameters if p.default is not None}
-    return st.fixed_dictionaries(required, optional=optional)
+    def one(chosen: str) -> st.SearchStrategy[dict[str, Any]]:
+        required = {p.name: values(p) for p in complete(kind, chosen) if p.default is None}
+        optional = {p.name: values(p) for p in kind.parameters if p.default is not None}
+        return st.fixed_dictionaries(required, optional=optional)
+
+    return st.sampled_from(kind.one_of or ("",)).flatmap(one)
+
+
+def complete(kind: Kind, chosen: str = "") -> list[Parameter]:
+    """The parameters of a whole entry, with the chosen one of those that exclude each other, or the first."""
+    kept = chosen if chosen in kind.one_of else "".join(kind.one_of[:1])
+    return [p for p in kind.parameters if p.name not in kind.one_of or p.name == kept]
 
 
 def whole(kind: Kind) -> st.SearchStrategy[Any]:
@@ -92,8 +101,9 @@ def check_realised(realised: dict[str, Any]) -> None:
     """All values of the kinds that were drawn are plain, complete and allowed."""
     for name, entries in realised.items():
         for entry in entries if KINDS[name].repeated else [entries]:
-            assert entry.keys() == {parameter.name for parameter in KINDS[name].parameters}
-            for parameter in KINDS[name].parameters:
+            chosen = next((one for one in KINDS[name].one_of if one in entry), "")
+            assert entry.keys() == {parameter.name for parameter in complete(KINDS[name], chosen)}
+            for parameter in complete(KINDS[name], chosen):
                 check_value(parameter, entry[parameter.name])
 
 
@@ -308,7 +318,7 @@ def test_refusals_say_what_was_likely_meant():
 @pytest.mark.parametrize("kind", KINDS.values(), ids=list(KINDS))
 def test_a_robot_refuses_the_kinds_that_it_cannot_honour(robot, kind):
     example = {
-        p.name: words(p)[0] if p.size == 0 else [p.low] * p.size if p.size > 1 else p.low for p in kind.parameters
+        p.name: words(p)[0] if p.size == 0 else [p.low] * p.size if p.size > 1 else p.low for p in complete(kind)
     }
     given_ = {kind.name: example}
     if kind.honored_by(robot):
@@ -372,7 +382,9 @@ def test_whatever_is_given_is_read_or_refused(given_):
 @given(name=st.sampled_from([(kind.name, p.name) for kind in KINDS.values() for p in kind.parameters]), value=anything)
 def test_whatever_is_given_for_one_parameter_is_read_or_refused(name, value):
     kind, parameter = name
-    base = {p.name: words(p)[0] if p.size == 0 else p.low for p in KINDS[kind].parameters if p.default is None}
+    base = {
+        p.name: words(p)[0] if p.size == 0 else p.low for p in complete(KINDS[kind], parameter) if p.default is None
+    }
     field = ""
     try:
         realised = draw({kind: {**base, parameter: value}})

@@ -12,7 +12,9 @@ import numpy as np
 from artde_gym.arguments import flag, steps_per_period, word
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
+from artde_gym.disturbances.ground import GrfPulses
 from artde_gym.disturbances.numeric import Words
+from artde_gym.errors import DisturbanceError
 from artde_gym.layout import Field, Layout
 from artde_gym.multibody.dynamics import GRAVITY
 from artde_gym.multibody.spec import RobotSpec, Vector
@@ -229,13 +231,34 @@ class Walk:
 
     def parse(self, disturbances: Mapping[str, Any]) -> Disturbances:
         """Read disturbances of this robot."""
-        return Disturbances.parse(disturbances, self.words["site"], self.words["joint"], self.nominal_robot.name)
+        parsed = Disturbances.parse(disturbances, self.words["site"], self.words["joint"], self.nominal_robot.name)
+        if not any(self.nominal_robot.armature) and any(kind == "rotor_inertia" for kind, _ in parsed.entries):
+            allowed = "actuator_inertia='rotor' beside it: discs and bare links have no rotors"
+            raise DisturbanceError("disturbances", "rotor_inertia", allowed)
+        return parsed
 
     def set_up(self, world: World, realised: Mapping[str, Any]) -> None:
         """Give a world what was drawn for it, the payload excepted."""
         world.set_friction(realised.get("friction", {}).get("coefficient", FRICTION))
         world.set_gravity(gravity(**realised.get("slope", {})))
-        world.scale_masses(realised.get("mass_error", {}).get("factor", 1.0))
+        factor = realised.get("mass_error", {}).get("factor", 1.0)
+        rotors = realised.get("rotor_inertia", {}).get("inertia", robot.ARMATURE) / robot.ARMATURE
+        world.scale_masses(factor, self._mass_factors(realised), rotors)
+        world.set_contact_time(realised.get("contact", {}).get("time_constant"))
+
+    def _mass_factors(self, realised: Mapping[str, Any]) -> dict[str, float]:
+        """Factors of the masses of links, by name: legs of another mass, and the rest of the robot makes up for it."""
+        if "mass_distribution" not in realised:
+            return {}
+        legs = realised["mass_distribution"]["legs"]
+        masses = {link.name: link.mass for link in self.robot.links}
+        of_legs = math.fsum(masses[name] for name in self.robot.actuated)
+        rest = 1.0 + (1.0 - legs) * of_legs / (math.fsum(masses.values()) - of_legs)
+        return {name: legs if name in self.robot.actuated else rest for name in masses}
+
+    def pulses(self, n: int) -> GrfPulses:
+        """The ground reaction pulses of `n` robots on this walk."""
+        return GrfPulses(n, self.pattern.load_left, TIME_STEP)
 
     def pose(self, realised: Mapping[str, Any]) -> Array:
         """Joint angles (12,) (rad) in which the robot is to settle."""
@@ -253,11 +276,20 @@ class Walk:
         return self.stand + SETTLE_STIFFNESS * (pose - q) - self.damping * qd
 
 
+def torque_limit(realised: Mapping[str, Any]) -> float:
+    """The largest torque (Nm) of a joint with what was drawn."""
+    return realised.get("torque_limit", {}).get("limit", robot.TORQUE_LIMIT)
+
+
 def settling(realised: Mapping[str, Any]) -> int:
     """Time steps that a robot at rest on level ground needs to come to rest again with what was drawn."""
     if not realised.keys().isdisjoint(("slope", "initial_pose")):
         return SETTLE_POSE_STEPS
-    return 0 if realised.keys().isdisjoint(("payload", "friction", "mass_error")) else SETTLE_STEPS
+    return (
+        0
+        if realised.keys().isdisjoint(("payload", "friction", "mass_error", "mass_distribution", "contact"))
+        else SETTLE_STEPS
+    )
 
 
 def reward_terms(

@@ -1,0 +1,99 @@
+"""`artde-gym design`: how large m_bar may be, and how stiff the joints are then."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+import typer
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from artde_gym.cli.arguments import json_object
+from artde_gym.errors import OptionError
+from artde_gym.evaluation.store import write_atomically
+from artde_gym.palette import LOOKS
+from artde_gym.report.chart import Axis, Chart
+from controllers.design import DELAYED, Design
+from controllers.design import design as work_out
+
+ROBOTS = {"biped": "ojas", "quadrotor": "q450"}
+
+
+def design(
+    robot: Annotated[str, typer.Option(help=f"{' or '.join(ROBOTS)}.")] = "biped",
+    law: Annotated[str, typer.Option(help=f"{', '.join(DELAYED)}.")] = "tde",
+    preset: Annotated[str | None, typer.Option(help="Of the law's gains; see `list controllers`.")] = None,
+    gains: Annotated[str | None, typer.Option(help='JSON, in place of the preset\'s, e.g. {"m_bar": 0.08}.')] = None,
+    period: Annotated[float | None, typer.Option(help="Sampling period L (s). Default: the robot's.")] = None,
+    actuator_inertia: Annotated[str, typer.Option(help="Of the biped: rotor, lumped or none.")] = "rotor",
+    speed: Annotated[float, typer.Option(help="Of the biped's walk (m/s).")] = 0.1,
+    step_duration: Annotated[float, typer.Option(help="Of the biped's walk (s).")] = 1.0,
+    figure: Annotated[Path | None, typer.Option(help="SVG of the limit along the reference, one file a loop.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Print the valid range of m_bar, the joint stiffness K_d m_bar / L, and the room up to the edge."""
+    if robot not in ROBOTS:
+        raise OptionError("robot", robot, ", ".join(map(repr, ROBOTS)))
+    model: Literal["rotor", "lumped", "none"] = actuator_inertia  # pyright: ignore[reportAssignmentType]  # checked there
+    found = work_out(
+        ROBOTS[robot],
+        law,
+        preset,
+        period,
+        actuator_inertia=model,
+        speed=speed,
+        step_duration=step_duration,
+        gains=json_object("gains", gains),
+    )
+    if figure is not None:
+        for one in found:
+            drawing = draw(one).encode()
+            write_atomically(_file(figure, one, len(found) > 1), lambda file, drawing=drawing: file.write(drawing))
+    if as_json:
+        print(json.dumps({"robot": robot, "law": law, "loops": [one.to_dict() for one in found]}, indent=2))
+        return
+    for one in found:
+        _print(one, Console())
+
+
+def draw(one: Design) -> str:
+    """Draw the largest valid m_bar along the reference beside the chosen one, as an SVG file."""
+    unit, time = one.loop.unit, one.loop.time
+    still = len(time) == 1
+    x = Axis("time (s)", 0.0, 1.0 if still else float(time[-1]))
+    y = Axis.of(f"m_bar ({unit})", one.limit, one.m_bar, zero=True)
+    chart = Chart(f"Largest valid m_bar of the {one.loop.name} along the reference", x, y, 480, 280)
+    chart.line([0.0, 1.0] if still else time, np.repeat(one.limit, 2) if still else one.limit, LOOKS["tde"])
+    chart.level(one.largest, f"valid below {one.largest:.4g}", LOOKS["tde"])
+    for chosen in sorted(set(one.m_bar.tolist())):
+        chart.level(chosen, f"chosen {chosen:.4g}", LOOKS["artde"])
+    return chart.file()
+
+
+def _file(path: Path, one: Design, several: bool) -> Path:
+    return path.with_stem(f"{path.stem}-{one.loop.name}") if several else path
+
+
+def _print(one: Design, console: Console) -> None:
+    loop = one.loop
+    newton = "N" if loop.unit == "kg" else "Nm"
+    length = "m" if loop.unit == "kg" else "rad"
+    table = Table("joint", box=box.SIMPLE_HEAD, title_justify="left")
+    table.title = f"{loop.name}, L = {1e3 * one.period:g} ms ({loop.unit}, {newton}/{length}, {newton} s/{length})"
+    for title in ("m_bar", "valid below", "K_d m_bar/L", "m_bar/L"):
+        table.add_column(title, justify="right")
+    for joint in one.to_dict()["joints"]:
+        numbers = (joint["m_bar"], joint["largest_m_bar"], joint["stiffness"], joint["damping"])
+        table.add_row(joint["name"], *("" if number is None else f"{number:.4g}" for number in numbers))
+    console.print(table)
+    console.print(
+        f"Valid below: of a joint with the others as chosen. One m_bar for all: {one.largest:.4g} {loop.unit}."
+    )
+    low, high = one.eigenvalues.min(), one.eigenvalues.max()
+    edge = f"{100 * one.used:.0f} % of the way to the edge at 2, room for a factor of {one.room:.2f}"
+    verdict = edge if one.valid else "OUTSIDE (0, 2): time-delay estimation diverges"
+    console.print(f"Eigenvalues of M^-1 m_bar: {low:.3f} to {high:.3f}, {verdict}.")

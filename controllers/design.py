@@ -1,0 +1,216 @@
+"""The valid range of m_bar for a robot, and the joint stiffness that follows: for `artde-gym design` and `doctor`.
+
+Time-delay estimation converges where every eigenvalue of M(q)^-1 m_bar lies in (0, 2), along the whole reference
+motion. At the sampling period L the law then holds a joint with the stiffness K_d m_bar / L and the damping m_bar / L.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from artde_gym.errors import UnknownNameError, among
+from artde_gym.multibody.dynamics import RigidBodyTree, joint_space_inertia
+from artde_gym.robots.ojas.model import ActuatorInertia, ojas
+from artde_gym.robots.ojas.walking import walking_pattern
+from artde_gym.robots.q450.model import q450
+from controllers.law_table import LAWS
+from controllers.laws.tde import TdeGains
+from controllers.laws.tracking import check_positive_number
+from controllers.laws.validity import largest_joint_m_bar, largest_m_bar, tde_eigenvalues
+from controllers.presets import LOOPS, PRESETS, preset_gains
+
+Array = NDArray[np.floating[Any]]
+
+DELAYED = ("tde", "atde", "artde", "tde+c", "tde+kd")
+"""Laws that estimate by time delay."""
+PERIODS = {"ojas": 0.001, "q450": 0.015}
+"""Robot -> the sampling period (s) of its environments where nothing else is asked for."""
+_WALKED, _SAMPLED = 8.0, 0.01  # s, of the reference walk and between its samples
+
+
+class Loop(NamedTuple):
+    """A part of a robot that one law drives, along its reference.
+
+    Attributes:
+        name: "joints", "position" or "attitude".
+        joints: names of its coordinates.
+        unit: of its inertia.
+        time: of the reference (k,) (s).
+        inertia: that the law meets (k, n, n).
+    """
+
+    name: str
+    joints: tuple[str, ...]
+    unit: str
+    time: Array
+    inertia: Array
+
+
+@dataclasses.dataclass(frozen=True)
+class Design:
+    """What the gains of one loop mean at a sampling period.
+
+    Attributes:
+        loop: that they drive.
+        gains: with m_bar and k_d.
+        period: L that the law divides by (s).
+        eigenvalues: of M^-1 m_bar along the reference (k, n).
+        limit: scalar m_bar below which all of them are valid, along the reference (k,).
+        joint_limits: m_bar of each joint below which they are, the other joints as chosen, the smallest along the
+            reference (n,); zero where the others alone leave the range, NaN where m_bar is a matrix with products.
+    """
+
+    loop: Loop
+    gains: TdeGains
+    period: float
+    eigenvalues: Array
+    limit: Array
+    joint_limits: Array
+
+    @property
+    def valid(self) -> bool:
+        return bool((self.eigenvalues > 0).all() and (self.eigenvalues < 2).all())
+
+    @property
+    def largest(self) -> float:
+        """Scalar m_bar below which the loop is valid along the whole reference."""
+        return float(self.limit.min())
+
+    @property
+    def m_bar(self) -> Array:
+        """The chosen m_bar of each joint (n,)."""
+        chosen = np.asarray(self.gains.m_bar, dtype=np.float64)
+        return np.diagonal(chosen) if chosen.ndim == 2 else np.broadcast_to(chosen, len(self.loop.joints))
+
+    @property
+    def stiffness(self) -> Array:
+        """K_d m_bar / L of each joint (n,)."""
+        return np.asarray(self.gains.k_d, dtype=np.float64) * self.m_bar / self.period
+
+    @property
+    def used(self) -> float:
+        """Share of the valid range that the chosen m_bar uses; 1 is the edge."""
+        return float(self.eigenvalues.max()) / 2.0
+
+    @property
+    def room(self) -> float:
+        """Factor by which the whole m_bar may grow up to the edge."""
+        return 1.0 / self.used
+
+    def to_dict(self) -> dict[str, Any]:
+        """All of it as JSON has it; what is not a number as None."""
+        loop = self.loop
+        joints = zip(loop.joints, self.m_bar, self.joint_limits, self.stiffness, strict=True)
+        return {
+            "loop": loop.name,
+            "unit": loop.unit,
+            "period_s": self.period,
+            "valid": self.valid,
+            "largest_m_bar": self.largest,
+            "eigenvalues": [float(self.eigenvalues.min()), float(self.eigenvalues.max())],
+            "used": self.used,
+            "room": self.room,
+            "joints": [
+                {
+                    "name": name,
+                    "m_bar": float(chosen),
+                    "largest_m_bar": float(limit) if np.isfinite(limit) else None,
+                    "stiffness": float(stiffness),
+                    "damping": float(chosen) / self.period,
+                }
+                for name, chosen, limit, stiffness in joints
+            ],
+            "along_the_reference": {"time_s": loop.time.tolist(), "largest_m_bar": self.limit.tolist()},
+        }
+
+
+def loops(
+    robot: str, actuator_inertia: ActuatorInertia = "rotor", speed: float = 0.1, step_duration: float = 1.0
+) -> list[Loop]:
+    """List the loops of a robot; of the biped along a walk, of the quadrotor those of the bare vehicle.
+
+    Raises:
+        UnknownNameError: for an unknown robot.
+        OptionError: for an argument of the walk out of range.
+    """
+    if robot == "ojas":
+        pattern = walking_pattern(speed, step_duration, _WALKED, _SAMPLED)
+        spec = ojas(actuator_inertia)
+        inertia = joint_space_inertia(RigidBodyTree(spec).mass_matrix(pattern.q))
+        return [Loop("joints", spec.actuated, "kg m^2", _SAMPLED * np.arange(len(inertia)), inertia)]
+    if robot != "q450":
+        raise UnknownNameError("robot", robot, among(robot, PERIODS))
+    vehicle = q450()
+    body, still = np.diag(vehicle.base.inertia), np.zeros(1)
+    return [
+        Loop("position", ("x", "y", "z"), "kg", still, vehicle.mass * np.eye(3)[None]),
+        Loop("attitude", ("roll", "pitch", "yaw"), "kg m^2", still, body[None]),
+    ]
+
+
+def judge(loop: Loop, gains: TdeGains, period: float) -> Design:
+    """Compare the gains of a loop with its limits.
+
+    Raises:
+        GainError: for an m_bar that does not fit the loop, or a period that is not above zero.
+    """
+    check_positive_number("period", period)
+    eigenvalues = tde_eigenvalues(loop.inertia, gains.m_bar)
+    each = largest_joint_m_bar(loop.inertia, gains.m_bar).min(axis=0)
+    return Design(loop, gains, period, eigenvalues, largest_m_bar(loop.inertia), each)
+
+
+def design(
+    robot: str,
+    law: str = "tde",
+    preset: str | None = None,
+    period: float | None = None,
+    *,
+    actuator_inertia: ActuatorInertia = "rotor",
+    speed: float = 0.1,
+    step_duration: float = 1.0,
+    gains: dict[str, Any] | None = None,
+) -> list[Design]:
+    """Work out, loop by loop, how large m_bar may be and how stiff the chosen gains are.
+
+    Args:
+        robot: "ojas" or "q450".
+        law: one of `DELAYED`.
+        preset: name of its gains; None for the law's default.
+        period: L that the law divides by (s); None for the robot's usual sampling period.
+        actuator_inertia, speed, step_duration: of the biped's walk.
+        gains: in place of the preset's.
+
+    Raises:
+        UnknownNameError: for an unknown robot or preset, or a law without a time-delay estimate.
+        GainError: for a gain or period that is not allowed.
+        OptionError: for an argument of the walk out of range.
+    """
+    if robot not in PERIODS:
+        raise UnknownNameError("robot", robot, among(robot, PERIODS))
+    if law not in DELAYED:
+        raise UnknownNameError("law with a time-delay estimate", law, among(law, DELAYED))
+    found = loops(robot, actuator_inertia, speed, step_duration)
+    chosen = preset_gains(robot, law, preset, len(found[0].joints), gains or {})
+    length = PERIODS[robot] if period is None else period
+    return [judge(loop, _of_loop(chosen, loop, law, length), length) for loop in found]
+
+
+def preset_designs(loop: Loop, robot: str, *, tuned: bool) -> list[Design]:
+    """Judge a loop at all presets of laws that estimate by time delay: those that tuning found, or the others."""
+    period = PERIODS[robot]
+    return [
+        judge(loop, _of_loop(entry.gains, loop, law, period), period)
+        for (law, preset), entry in PRESETS[robot].items()
+        if law in DELAYED and (preset == "tuned") == tuned
+    ]
+
+
+def _of_loop(gains: Any, loop: Loop, law: str, period: float) -> TdeGains:
+    """The gains of one loop, of a cascade or whole, as the law runs them."""
+    own = getattr(gains, loop.name) if loop.name in LOOPS else gains
+    return LAWS[law].convert(own, period)
