@@ -124,7 +124,7 @@ KIT = RobotKit(
             "sites",
             "torque_limit",
         }
-    ),  # fmt: skip
+    ),
     scenarios=_SCENARIOS,
     reproduced=(("S1", "S2", "S3", "S1-L4", "S2-L4", "S3-L4"), ("tde", "atde", "artde")),
     frontier=_FRONTIER,
