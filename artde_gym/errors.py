@@ -25,6 +25,13 @@ class OptionError(ArtdeGymError):
     """An argument of an environment, of `reset(options=...)` or of an evaluation."""
 
 
+class MissingDependencyError(OptionError):
+    """An argument that needs a package which this Python does not have; `allowed` says what to do."""
+
+    def __str__(self) -> str:
+        return f"{self.field} {self.value!r} is not available: {self.allowed}"
+
+
 class ActionError(ArtdeGymError):
     """An action of the wrong shape, or with a value that is not finite."""
 

@@ -18,6 +18,7 @@ import artde_gym
 from artde_gym.arguments import reading
 from artde_gym.errors import among
 from artde_gym.evaluation import evaluate
+from artde_gym.evaluation.environments import with_engine
 from baselines.errors import TrainingError
 from baselines.network import Network
 from baselines.policy_file import Saved, layout_hash, save
@@ -107,7 +108,8 @@ class Run:
         self.training, self.folder, self.task = training, folder, task(training.env_id)
         self._on_progress = on_progress or (lambda _: None)
         self.state: dict[str, Any] = {"best": None, "stale": 0, "tests": []}
-        _claim(folder, json.loads(json.dumps(dataclasses.asdict(training))), {"workers"} if self.batched else set())
+        configuration = {**dataclasses.asdict(training), "engine": environment_kwargs(training).get("engine")}
+        _claim(folder, json.loads(json.dumps(configuration)), {"workers"} if self.batched else set())
 
     @property
     def batched(self) -> bool:
@@ -177,7 +179,9 @@ _SHOWN = ("fell", "duration_s", "rmse_m", "reward")
 
 def environment_kwargs(training: Training) -> dict[str, Any]:
     """Arguments of the training's environments."""
-    return {**task(training.env_id).kwargs, **training.env_kwargs}
+    known = task(training.env_id)
+    given = {**known.kwargs, **training.env_kwargs}
+    return given if known.batch_engine is None else with_engine(training.env_id, given)  # else a batch is an engine
 
 
 def single(env_id: str, kwargs: dict[str, Any], recipe: Recipe) -> ResidualEnv:

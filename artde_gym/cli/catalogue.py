@@ -10,7 +10,6 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from artde_gym.cli.arguments import ENGINES
 from artde_gym.disturbances import KINDS
 from artde_gym.disturbances.kinds import ALL, allowed
 from artde_gym.evaluation import SCENARIOS
@@ -19,6 +18,7 @@ from artde_gym.evaluation.frontier_standard import STANDARDS
 from artde_gym.registration import registered_controllers
 from artde_gym.robots.ojas import ojas
 from artde_gym.robots.q450 import ROTORS, q450
+from artde_gym.sim.factory import ENGINES
 from controllers.presets import LOOPS, PRESETS, named_gains
 from controllers.presets.units import unit_of
 

@@ -9,18 +9,21 @@ import pandas as pd
 import typer
 from rich.console import Console
 
-from artde_gym.cli.arguments import ENGINES, Pictures, Report, Seed, Videos, Workers, names, processes
+from artde_gym.cli.arguments import Pictures, Report, Seed, Videos, Workers, names, processes
 from artde_gym.cli.display import Display
 from artde_gym.cli.report import show_report
 from artde_gym.evaluation import reproduce as run_reproduction
 from artde_gym.evaluation.claims import confirm
 from artde_gym.evaluation.console import print_claims, print_result
 from artde_gym.evaluation.reproduce import ROBOTS, scenarios_of
+from artde_gym.sim.factory import ENGINES, resolve_engine
 
 
 def reproduce(
     robot: Annotated[str, typer.Option(help=f"{', '.join(ROBOTS)}, or all.")] = "all",
-    engine: Annotated[str, typer.Option(help=f"Physics engine: {', '.join(ENGINES)}, or both.")] = "bullet",
+    engine: Annotated[
+        str | None, typer.Option(help=f"Physics engine: {', '.join(ENGINES)}, or both. Default: see `doctor`.")
+    ] = None,
     episodes: Annotated[int, typer.Option(help="Seeded episodes of each controller in each scenario.")] = 10,
     scenario: Annotated[str | None, typer.Option(help="Names, comma-separated. Default: all of the robot.")] = None,
     controllers: Annotated[str | None, typer.Option(help="Names, comma-separated. Default: the robot's own.")] = None,
@@ -38,7 +41,7 @@ def reproduce(
 ) -> None:
     """Run the thesis' scenarios and print its tables beside ours, then each of its claims with a verdict."""
     robots = list(ROBOTS) if robot == "all" else [robot]
-    engines = list(ENGINES) if engine == "both" else [engine]
+    engines = list(ENGINES) if engine == "both" else [resolve_engine(engine)]
     named = None if scenario is None else names(scenario)
     console = Console()
     for name in robots:

@@ -26,7 +26,7 @@ from artde_gym.errors import OptionError
 from artde_gym.robots import ojas as robot
 from artde_gym.robots.ojas import ActuatorInertia
 from artde_gym.sim.engine import Camera, Engine
-from artde_gym.sim.factory import EngineName, make_engine
+from artde_gym.sim.factory import EngineName, make_engine, resolve_engine
 from artde_gym.sim.rotation import arcsine, roll_pitch
 
 CAMERA_HEIGHT = 0.42  # m, of what it looks at
@@ -35,7 +35,7 @@ LEEWAY = 0.15  # m, that the robot may be off its pattern before the camera goes
 _PAGE = (
     task.DOCUMENTATION
     + """
-| `engine` | "bullet" | "bullet", "mujoco" | physics engine; see docs/engines.md |
+| `engine` | None | "bullet", "mujoco", None | physics engine; None: Bullet where it can be imported, else MuJoCo |
 | `width`, `height` | 640, 480 | 16 to 4096 | pixels of a picture |
 
 With `render_mode="rgb_array"`, `render` draws 30 pictures a simulated second; asked more often, it gives the last one
@@ -61,7 +61,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self_collision: whether the feet stop each other; a walk as planned never lets them touch.
         speed: see `artde_gym.references.walking`, also for `step_duration` and `duration`.
         observe_ground_force: whether the observation ends with the ground's force on each foot.
-        engine: physics engine.
+        engine: physics engine; None for the default. `engine_name` says which one it is.
         width, height: of pictures (pixels).
         render_mode: "rgb_array" or None.
 
@@ -89,7 +89,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         step_duration: float = 1.0,
         duration: float = 58.0,
         observe_ground_force: bool = False,
-        engine: EngineName = "bullet",
+        engine: EngineName | None = None,
         width: int = 640,
         height: int = 480,
         render_mode: Literal["rgb_array"] | None = None,
@@ -102,7 +102,10 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         )
         self.nominal_robot, self.pattern, self.control_period = walk.nominal_robot, walk.pattern, walk.control_period
         self._disturbances = walk.parse(self.default_disturbances if disturbances is None else disturbances)
-        self._engine: Engine = make_engine(engine, walk.robot, task.TIME_STEP, renders=render_mode is not None)
+        self.engine_name = resolve_engine(engine)
+        self._engine: Engine = make_engine(
+            self.engine_name, walk.robot, task.TIME_STEP, renders=render_mode is not None
+        )
         camera = Camera((0.0, 0.0, CAMERA_HEIGHT), width=width, height=height)
         self.view = View(self._engine, camera, self.control_period, share=1.0, slack=LEEWAY)
         self.metadata = {**self.metadata, **self.view.metadata}

@@ -106,6 +106,7 @@ class BipedVectorEnv(BatchEnv):
         self.nominal_robot, self.pattern, self.control_period = walk.nominal_robot, walk.pattern, walk.control_period
         self._last = walk.last
         self._disturbances = self._parse(self.default_disturbances if disturbances is None else disturbances)
+        self.engine_name = engine
         self._batch = make_batch(engine, walk.robot, num_envs, task.TIME_STEP, threads)
         self._courses: dict[int, Course] = {}
         self._wakes = np.full(num_envs, NEVER)  # time step of each walk in which its course is to be asked again

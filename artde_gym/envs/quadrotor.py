@@ -30,7 +30,7 @@ from artde_gym.references.infinity import START
 from artde_gym.robots import q450 as robot
 from artde_gym.robots.spec import Vector
 from artde_gym.sim.engine import Camera, Engine
-from artde_gym.sim.factory import EngineName, make_engine
+from artde_gym.sim.factory import EngineName, make_engine, resolve_engine
 from artde_gym.sim.rotation import matrix
 
 TIME_STEP = 0.001  # s, of the physics
@@ -54,7 +54,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
     `vectorization_mode="vector_entry_point"` gives thousands of the same in NumPy (`artde_gym.envs.quadrotor_batch`).
 
     {shared}
-    | `engine` | "bullet" | "bullet", "mujoco" | physics engine; see docs/engines.md |
+    | `engine` | None | "bullet", "mujoco", None | physics engine; None: Bullet where it can be imported, else MuJoCo |
     | `width`, `height` | 640, 480 | 16 to 4096 | pixels of a picture |
 
     With `render_mode="rgb_array"`, `render` draws 30 pictures a simulated second; asked more often, it gives the last
@@ -89,7 +89,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         control_period: float = 0.015,
         measurement: Measurement = "ideal",
         duration: float = 70.0,
-        engine: EngineName = "bullet",
+        engine: EngineName | None = None,
         width: int = 640,
         height: int = 480,
         render_mode: Literal["rgb_array"] | None = None,
@@ -109,7 +109,10 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self.observation_space = task.OBSERVATION.box()
         self.action_space = task.ACTION.box()
         self._low, self._high = self.action_space.low, self.action_space.high
-        self._engine: Engine = make_engine(engine, self.nominal_robot, TIME_STEP, renders=render_mode is not None)
+        self.engine_name = resolve_engine(engine)
+        self._engine: Engine = make_engine(
+            self.engine_name, self.nominal_robot, TIME_STEP, renders=render_mode is not None
+        )
         self.view = View(self._engine, CAMERA._replace(width=width, height=height), self.control_period, SHARE, LEEWAY)
         self.metadata = {**self.metadata, **self.view.metadata}
         self._engine.place(START, _NO_JOINTS)

@@ -36,7 +36,7 @@ import pandas as pd
 
 from artde_gym.errors import OptionError, UnknownNameError, among
 from artde_gym.evaluation import statistics
-from artde_gym.evaluation.environments import Backend, arguments_of
+from artde_gym.evaluation.environments import Backend, arguments_of, with_engine
 from artde_gym.evaluation.evaluate import CUSTOM, Update, evaluate
 from artde_gym.evaluation.frontier_axis import Axis, axis
 from artde_gym.evaluation.frontier_standard import Harder, standard_test
@@ -325,7 +325,7 @@ def _arguments(env_id: str, backend: Backend, varied: Axis, given: Mapping[str, 
             raise OptionError(f"argument of {env_id}", name, among(name, known))
         if name == "disturbances" or (varied.kind is None and name == varied.name):
             raise OptionError("env_kwargs", name, "arguments that are not varied; disturbances are given on their own")
-    return dict(given)
+    return with_engine(env_id, given, backend)
 
 
 class _Folder:

@@ -83,7 +83,7 @@ def reproduce(
     episodes: int = 10,
     seed: int = 0,
     workers: int = 1,
-    engine: str = "bullet",
+    engine: str | None = None,
     on_progress: Callable[[str, Update], None] | None = None,
 ) -> Reproduction:
     """Run a robot's scenarios with all its controllers and judge the claims made in them.
@@ -97,7 +97,7 @@ def reproduce(
         episodes: seeded episodes of each controller in each scenario.
         seed: of everything.
         workers: processes; the results do not depend on it.
-        engine: physics engine.
+        engine: physics engine; None for the default one.
         on_progress: called with what runs ("episodes", "ablation in S1") and the progress of its episodes.
 
     Raises:

@@ -14,7 +14,6 @@ hundredth of the run's time so far, at most for half a minute: no more work is l
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import json
 import os
 import re
@@ -24,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from filelock import FileLock, Timeout
 
 from artde_gym.errors import StoreError
 from artde_gym.evaluation import sweep_part
@@ -74,7 +74,7 @@ class SweepStore:
                 self.flush()
         finally:
             if self._lock is not None:
-                self._lock.close()
+                self._lock.release()
 
     def begin(self, sweep: str, types: sweep_part.Types) -> None:
         """Make the folder ready for episodes: what is corrupt goes aside, what an earlier process left half done goes.
@@ -147,13 +147,13 @@ class SweepStore:
         if _runs(self.folder) is None and not _parts(self.folder):
             raise _unreadable(self.folder)
         with self._writing():
-            self._lock = (self.folder / "sweep.lock").open("ab")
+            lock = FileLock(self.folder / "sweep.lock", blocking=False)
         try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            self._lock.close()
+            lock.acquire()
+        except Timeout:
             allowed = "a folder that no other process writes: a sweep is running there"
             raise StoreError("sweep folder", str(self.folder), allowed) from None
+        self._lock = lock
         runs = _runs(self.folder)
         if runs is None and (self.folder / RECORD).exists():
             self.set_aside.append(self.folder / RECORD)  # the parts tell all that is needed

@@ -30,7 +30,7 @@ import pandas as pd
 
 from artde_gym.arguments import reading
 from artde_gym.errors import OptionError, StoreError
-from artde_gym.evaluation.environments import Backend, single, tracking_of
+from artde_gym.evaluation.environments import Backend, single, tracking_of, with_engine
 from artde_gym.evaluation.evaluate import DEFAULT_ENVIRONMENT, Update, evaluate
 from artde_gym.evaluation.provenance import provenance
 from artde_gym.evaluation.result import Result
@@ -118,7 +118,7 @@ def tune(
     common: dict[str, Any] = {
         "scenario": scenario,
         "disturbances": disturbances,
-        "env_kwargs": dict(env_kwargs or {}),
+        "env_kwargs": with_engine(env_id, env_kwargs or {}, backend),
         "backend": backend,
     }
     configuration = {

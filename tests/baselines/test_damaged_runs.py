@@ -78,8 +78,8 @@ def test_a_recipe_cannot_lead_elsewhere(recipe: dict[str, Any], tmp_path: Path) 
         baselines.load(folder)
 
 
+@pytest.mark.torch
 def test_a_damaged_run_is_continued_or_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("stable_baselines3")
     import torch
 
     from baselines import tasks
