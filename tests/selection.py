@@ -1,7 +1,8 @@
 """Which tests this machine can run, and how many must have passed: nothing is left out by accident.
 
 A test with a marker of `NEEDS` is deselected where its packages cannot be imported. `bullet` is given to every test
-with a parameter "bullet", too. With `--at-least N`, a run in which fewer tests pass fails.
+with a parameter "bullet", `pinocchio` to every one with the fixture `judge`. With `--at-least N`, a run in which fewer
+tests pass fails.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import Any
 
 import pytest
 
-NEEDS = {"bullet": ("pybullet",), "torch": ("torch", "stable_baselines3"), "linux": ()}
+NEEDS = {"bullet": ("pybullet",), "torch": ("torch", "stable_baselines3"), "pinocchio": ("pinocchio",), "linux": ()}
 """Marker -> what must be importable; Linux needs nothing but Linux."""
 
 passed = pytest.StashKey[int]()
@@ -48,6 +49,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         parameters: Sequence[Any] = [*getattr(getattr(item, "callspec", None), "params", {}).values()]
         if any(isinstance(value, str) and value == "bullet" for value in parameters):
             item.add_marker("bullet")
+        if "judge" in getattr(item, "fixturenames", ()):
+            item.add_marker("pinocchio")
     left_out = [item for item in items if any(item.get_closest_marker(marker) for marker in missing)]
     if left_out:
         config.hook.pytest_deselected(items=left_out)
