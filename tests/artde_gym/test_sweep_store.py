@@ -120,8 +120,10 @@ def doomed(number):
                     os.ftruncate(args[0], os.fstat(args[0]).st_size // 2)
                 if kind != "after":
                     die()
-                real(*args, **kwargs)
-                die()
+                try:
+                    real(*args, **kwargs)
+                finally:  # a call that fails, as one for a folder that is there, is a place to die, too
+                    die()
             return real(*args, **kwargs)
         setattr(os, name, call)
 
