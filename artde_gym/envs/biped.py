@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artde_gym.arguments import action_array
-from artde_gym.arrays import Array
+from artde_gym.arrays import Array, total
 from artde_gym.disturbances.ground import LOADED
 from artde_gym.disturbances.schedule import Schedule
 from artde_gym.envs import biped_task as task
@@ -157,7 +157,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         info: dict[str, Any] = {"time_s": self._k * self.control_period}
         observation = self._measure(info)
         terms = info["reward_terms"] = self._reward_terms(previous)
-        reward = self.control_period * sum(map(operator.mul, task.REWARD_SCALES.values(), terms.values()))
+        reward = self.control_period * total(map(operator.mul, task.REWARD_SCALES.values(), terms.values()))
         if events:
             info["events"] = events
         falls = self._falls()

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artde_gym.arguments import action_array
-from artde_gym.arrays import Array
+from artde_gym.arrays import Array, total
 from artde_gym.disturbances.ground_effect import thrust_gain
 from artde_gym.disturbances.noise import draw_keys
 from artde_gym.disturbances.rotors import Rotors
@@ -152,7 +152,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self._k += 1
         observation = self._measure()
         terms = self._reward_terms(before)
-        reward = self.control_period * sum(map(operator.mul, task.REWARD_SCALES.values(), terms.values()))
+        reward = self.control_period * total(map(operator.mul, task.REWARD_SCALES.values(), terms.values()))
         info: dict[str, Any] = {"time_s": self._k * self.control_period, "reward_terms": terms}
         if events:
             info["events"] = events

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import deque
 from collections.abc import Sequence
 from typing import Any
@@ -52,7 +53,9 @@ class MujocoWindow:
         self._window: Any = glfw.create_window(*SIZE, "artde-gym", None, None) if glfw.init() else None
         if self._window is None:
             why = errors[-1] if errors else "GLFW says nothing"
-            raise OptionError("display", why, "one that shows OpenGL; `artde-gym video` needs none")
+            raise OptionError(
+                "display", os.environ.get("DISPLAY"), f"one that shows OpenGL ({why}); `artde-gym video` needs none"
+            )
         glfw.make_context_current(self._window)
         glfw.swap_interval(0)
         self._keys: deque[str] = deque()

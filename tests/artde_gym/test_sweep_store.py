@@ -294,7 +294,7 @@ def test_every_run_leaves_its_provenance(tmp_path, whole):
     stored(tmp_path / "whole", [row(9)])
     record = json.loads((tmp_path / "whole" / "sweep.json").read_text())
     assert [run["complete"] for run in record["runs"]] == [True, True]
-    assert record["runs"][0]["provenance"]["packages"]["pybullet"] == "3.2.7"
+    assert record["runs"][0]["provenance"]["packages"]["mujoco"]
 
 
 # ---------------------------------------------------------------- full disk
