@@ -88,7 +88,7 @@ class MujocoWindow:
         mj.mj_forward(self._model, self._data)
         everything = mj.mjtCatBit.mjCAT_ALL.value
         mj.mjv_updateScene(self._model, self._data, mj.MjvOption(), None, self._eye, everything, self._scene)
-        self._shape(mj.mjtGeom.mjGEOM_PLANE, (0.0, 0.0, 0.0), (0.0, 0.0, 0.1), GROUND)
+        self._shape(mj.mjtGeom.mjGEOM_BOX, (0.0, 0.0, -0.01), (30.0, 30.0, 0.01), GROUND)
         if payload is not None:
             self._shape(mj.mjtGeom.mjGEOM_SPHERE, payload, (PAYLOAD_LOOK, 0.0, 0.0), PAYLOAD_COLOUR)
         for tail, tip, _ in self._arrows:
