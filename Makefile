@@ -14,7 +14,7 @@ CUDA := ^(cuda|nvidia)-|^triton=
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help evaluate test tests lowest check format benchmark soak docs gallery constraints dist clean
+.PHONY: help evaluate test tests coverage lowest check format benchmark soak docs gallery constraints dist clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*  ## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -26,6 +26,9 @@ test: check tests  ## all checks, then all tests (a selection: ARGS=...)
 
 tests: $(VENV)/dev  ## all tests that this Python can run: without PyBullet or PyTorch, those that need none
 	$(TESTS) $(ARGS)
+
+coverage: $(VENV)/dev  ## lines and branches that the tests reach, as a table and as htmlcov/
+	$(TESTS) --cov --cov-report=term:skip-covered --cov-report=html $(ARGS)
 
 lowest: LEAST := 1000
 lowest: $(VENV)-lowest/dev  ## the tests with the lowest versions that pyproject.toml allows (PyTorch: the pinned one)
@@ -73,7 +76,7 @@ dist: $(VENV)/core  ## the wheel and the sdist into dist/, checked as an index w
 		print(f'{wheel}: {size / 1e6:.2f} MB'); assert size < 1.5e6, 'a wheel is smaller than 1.5 MB'"
 
 clean:  ## remove the environment and all caches, keep runs
-	rm -rf .venv .venv-* build dist site .hypothesis .import_linter_cache .pytest_cache .ruff_cache *.egg-info
+	rm -rf .venv .venv-* build dist site .hypothesis .import_linter_cache .pytest_cache .ruff_cache htmlcov .coverage *.egg-info
 	find artde_gym baselines controllers scripts tests -name __pycache__ -exec rm -rf {} +
 
 $(VENV)/core: pyproject.toml constraints.txt
