@@ -23,7 +23,10 @@ def numeric(sampled: Mapping[str, Any], words: Words) -> dict[str, Any]:
     """Name each number, words being replaced by numbers and lists of entries by arrays."""
     told: dict[str, Any] = {}
     for kind, value in sampled.items():
+        absent = [name for name in KINDS[kind].one_of if name not in value]
         for parameter in KINDS[kind].parameters:
+            if parameter.name in absent:
+                continue
             told[f"disturbance.{kind}.{parameter.name}"] = (
                 np.array([_number(parameter, entry[parameter.name], words) for entry in value])
                 if KINDS[kind].repeated

@@ -66,7 +66,10 @@ def with_engine(env_id: str, kwargs: Mapping[str, Any], backend: Backend = "sing
     if known is None:
         return dict(kwargs)
     given = kwargs.get("engine", known.default)
-    return {**kwargs, "engine": resolve_engine(given) if backend == "single" else given}
+    if backend == "single":
+        return {**kwargs, "engine": resolve_engine(given)}
+    creator: Any = load_env_creator(_entry_point(env_id, backend))
+    return {**kwargs, "engine": getattr(creator, "own_engine", None) if given is None else given}
 
 
 def physics_of(kwargs: Mapping[str, Any]) -> str:
