@@ -29,7 +29,7 @@ def resolve_engine(name: str | None) -> EngineName:
     """
     if name is None:
         return "mujoco" if missing_bullet() else "bullet"
-    if name not in ENGINES:
+    if not (isinstance(name, str) and name in ENGINES):
         raise OptionError("engine", name, "'bullet', 'mujoco', or None for the default")
     return cast(EngineName, name)
 
