@@ -6,7 +6,7 @@ INSTALL := $(BIN)/python -m pip install --disable-pip-version-check --quiet --co
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help evaluate test check format benchmark soak docs gallery clean
+.PHONY: help evaluate test clients check format benchmark soak docs gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*  ## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -16,6 +16,9 @@ evaluate: .venv/core  ## the main job: TDE, ATDE and ARTDE beside the thesis, in
 
 test: check  ## all checks, then all tests (a selection: ARGS=...)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 $(ARGS)
+
+clients: .venv/core  ## train with learning libraries, in environments of their own (some: ARGS="tianshou rllib")
+	$(BIN)/python scripts/clients.py $(ARGS)
 
 check: .venv/dev  ## format, lint, types and import contracts
 	$(BIN)/ruff format --check
@@ -41,7 +44,7 @@ gallery: .venv/dev  ## remake the pictures of the README and of the documentatio
 	OMP_NUM_THREADS=1 $(BIN)/python scripts/gallery.py
 
 clean:  ## remove the environment and all caches, keep runs
-	rm -rf .venv build dist site .hypothesis .import_linter_cache .pytest_cache .ruff_cache *.egg-info
+	rm -rf .venv .venv-clients build dist site .hypothesis .import_linter_cache .pytest_cache .ruff_cache *.egg-info
 	find artde_gym baselines controllers scripts tests -name __pycache__ -exec rm -rf {} +
 
 .venv/core: pyproject.toml constraints.txt scripts/build_backend.py
