@@ -41,7 +41,6 @@ def generated() -> dict[str, str]:
     pages |= {
         f"policies/{card.parent.name}.md": _moved(card.read_text(encoding="utf-8"), r"\.\./", "") for card in cards()
     }
-    pages["results.md"] = _part_of_readme("What holds so far")
     pages["contributing.md"] = _linked_to_site((ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"))
     pages["changelog.md"] = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     return pages
@@ -92,14 +91,6 @@ def _presets(robot: str) -> str:
         for (law, preset), entry in PRESETS[robot].items()
     ]
     return "\n".join(rows)
-
-
-def _part_of_readme(title: str) -> str:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    found = re.search(rf"^## {title}\n(.*?)(?=^## )", text, re.DOTALL | re.MULTILINE)
-    if found is None:
-        raise ValueError(f"README.md has no part {title!r}")
-    return f"# {title}\n" + _moved(found[1], r"baselines/policies/", "policies/").replace("](docs/", "](")
 
 
 def _linked_to_site(text: str) -> str:
