@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from artde_gym.evaluation.evaluate import Update
+from artde_gym.evaluation.tasks import Update
 
 
 def terminal() -> Console:
