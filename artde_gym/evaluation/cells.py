@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from artde_gym.errors import OptionError
@@ -38,6 +38,8 @@ def cells_of(
     Raises:
         UnknownNameError, OptionError: for an unknown scenario, or one of another environment.
     """
+    if not (env_id is None or isinstance(env_id, str)):
+        raise OptionError("env_id", env_id, "the id of an environment, or None")
     kwargs = _mapping("env_kwargs", kwargs or {}, "a mapping of arguments of the environment")
     if "disturbances" in kwargs:
         raise OptionError(
@@ -57,6 +59,8 @@ def cells_of(
 
 def _scenarios(env_id: str | None, names: str | Sequence[str]) -> list[Scenario]:
     """The scenarios of these names, all of them of the environment if one is given."""
+    if not isinstance(names, Iterable):
+        raise OptionError("scenario", names, "a name or several, or None")
     entries = [find_scenario(name) for name in ([names] if isinstance(names, str) else names)]
     if not entries:
         raise OptionError("scenario", names, "at least one name, or None")

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from artde_gym.errors import OptionError, UnknownNameError, among
 from artde_gym.evaluation import canonical
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.registration import ControllerSpec, registered_controllers
+
+_LIST = "a list of names or policies, at least one"
 
 
 def labelled(controllers: Any) -> dict[str, str | Policy]:
@@ -17,8 +19,8 @@ def labelled(controllers: Any) -> dict[str, str | Policy]:
     Raises:
         OptionError: for no controller, a name that is no word, or one that comes twice.
     """
-    if isinstance(controllers, str):
-        raise OptionError("controllers", controllers, "a list of names or policies")
+    if isinstance(controllers, str) or not isinstance(controllers, Iterable):
+        raise OptionError("controllers", controllers, _LIST)
     if isinstance(controllers, Mapping):
         pairs = list(controllers.items())
     else:
@@ -27,7 +29,7 @@ def labelled(controllers: Any) -> dict[str, str | Policy]:
             for item in controllers
         ]
     if not pairs:
-        raise OptionError("controllers", controllers, "at least one")
+        raise OptionError("controllers", controllers, _LIST)
     for label, _ in pairs:
         if not isinstance(label, str):
             raise OptionError("name of a controller", label, "a word")

@@ -111,7 +111,7 @@ def frontier(
         trace_hz=TRACE_HZ,
         allow_mixed=allow_mixed,
     )
-    design = Design.of(plan, axis(env_id, vary, low, high, tolerance, harder), survival)
+    design = Design.of(plan, axis(plan.cells[0].env_id, vary, low, high, tolerance, harder), survival)
     store = None if out is None else FrontierStore(Path(out), _configuration(plan, design), allow_mixed)
     return _Levels(plan, design, store, on_progress).search()
 

@@ -34,6 +34,7 @@ from artde_gym.evaluation.environments import Backend, single, tracking_of
 from artde_gym.evaluation.evaluate import run_plan
 from artde_gym.evaluation.gains import policy_for
 from artde_gym.evaluation.identity import behind
+from artde_gym.evaluation.labels import labelled
 from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.plan import MOST_EPISODES, Plan
 from artde_gym.evaluation.result import Result
@@ -141,17 +142,13 @@ def tune(
 
 def _names(controllers: Any) -> list[str]:
     """The controllers, if they can be told from their tuned selves."""
-    if isinstance(controllers, str) or not controllers:
-        raise OptionError("controllers", controllers, "a list of names")
-    names = list(controllers)
-    for name in names:
-        if not isinstance(name, str):
-            raise OptionError("controllers", name, "a registered name: an object has its own gains")
-    if len(set(names)) < len(names):
-        raise OptionError("controllers", names, "each name once")
+    names = labelled(controllers)
+    for name, item in names.items():
+        if name != item:
+            raise OptionError("controllers", item, "registered names: an object has its own gains")
     if canonical.twice([*names, *(name + TUNED for name in names)]):
-        raise OptionError("controllers", names, f"names that differ by more than {TUNED!r}")
-    return names
+        raise OptionError("controllers", list(names), f"names that differ by more than {TUNED!r}")
+    return list(names)
 
 
 def _one_scenario(scenario: Any) -> str | None:
