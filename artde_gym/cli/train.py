@@ -72,7 +72,7 @@ def train(
 
 
 def _trainer(algo: str) -> Callable[..., Path]:
-    """The function that trains with an algorithm; torch is heavy, and may not be installed."""
+    """Find the function that trains with an algorithm; torch is heavy, and may not be installed."""
     try:
         if algo == "cma-es":
             from baselines.tune_balance import tune as go

@@ -58,7 +58,7 @@ def cells_of(
 
 
 def _scenarios(env_id: str | None, names: str | Sequence[str]) -> list[Scenario]:
-    """The scenarios of these names, all of them of the environment if one is given."""
+    """Find the scenarios of these names, all of them of the environment if one is given."""
     if not isinstance(names, Iterable):
         raise OptionError("scenario", names, "a name or several, or None")
     entries = [find_scenario(name) for name in ([names] if isinstance(names, str) else names)]

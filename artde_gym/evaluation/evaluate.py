@@ -119,7 +119,7 @@ def run_plan(plan: Plan, out: str | Path | None = None, on_progress: Callable[[U
 
 
 def _in_order(rows: list[dict[str, Any]], plan: Plan) -> list[dict[str, Any]]:
-    """Rows by episode, cell and controller, in whatever order they were run."""
+    """Sort rows by episode, cell and controller, in whatever order they were run."""
     pairs = itertools.product([cell.name for cell in plan.cells], plan.controllers)
     places = {pair: i for i, pair in enumerate(pairs)}
     return sorted(rows, key=lambda row: (row["episode"], places[row["scenario"], row["controller"]]))

@@ -11,7 +11,7 @@ from artde_gym.registration import ControllerSpec, make_controller, register_spe
 
 
 def checked_gains(gains: Any, named: Collection[str]) -> dict[str, dict[str, Any]]:
-    """Gains of each controller that has any given, in dictionaries of their own.
+    """Check gains, and return those of each controller that has any given in a dictionary of its own.
 
     Raises:
         UnknownNameError: for gains of a controller that is not among those named.

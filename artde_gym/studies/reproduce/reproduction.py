@@ -139,7 +139,7 @@ def reproduce(
 def _with_ablation(
     result: Result, plan: Plan, cell: Cell, folder: Path, on_progress: Callable[[str, Update], None] | None
 ) -> Result:
-    """The result with episodes of the ablation in one scenario."""
+    """Add episodes of the ablation in one scenario to a result."""
     gains = {ABLATION: equivalent_gains(result, cell.name)}
     own = dataclasses.replace(plan, controllers=named_controllers([ABLATION]), cells=(cell,), gains=gains)
     news = on_progress and functools.partial(on_progress, f"ablation in {cell.name}")

@@ -199,7 +199,7 @@ def _place(point: Point) -> tuple[str, str, str]:
 
 
 def _tasks(plan: Design, points: Mapping[str, Point], done: set[Key]) -> Iterator[Task]:
-    """What is left to run."""
+    """Return what is left to run."""
     names = {point.id: (name, point.controller) for name, point in points.items()}
     finished = {(*names[cell], episode) for cell, episode in done}
     return tasks_of([_case(name, point) for name, point in points.items()], plan.episodes, plan.backend, finished)

@@ -141,7 +141,7 @@ def tune(
 
 
 def _names(controllers: Any) -> list[str]:
-    """The controllers, if they can be told from their tuned selves."""
+    """Return the controllers, if they can be told from their tuned selves."""
     names = labelled(controllers)
     for name, item in names.items():
         if name != item:
