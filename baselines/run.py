@@ -20,8 +20,8 @@ import artde_gym
 from artde_gym.arguments import number, reading
 from artde_gym.errors import among
 from artde_gym.evaluation import evaluate
+from artde_gym.evaluation.cells import cells_of, tried
 from artde_gym.evaluation.environments import Backend, with_engine
-from artde_gym.evaluation.evaluate import cells_of, tried
 from artde_gym.evaluation.store import write_atomically
 from artde_gym.evaluation.workers import check_workers
 from baselines.errors import TrainingError

@@ -6,8 +6,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from artde_gym.evaluation.environments import physics_of
-from artde_gym.evaluation.evaluate import Task, Update
 from artde_gym.evaluation.provenance import versions
+from artde_gym.evaluation.tasks import Task, Update
 
 
 def terminal() -> Console:

@@ -33,8 +33,8 @@ def play(
     gains: Gains = None,
 ) -> None:
     """Watch a controller live in a window, push the robot and drop its payload by key or mouse."""
-    from artde_gym.evaluation.environments import single  # only when asked for
-    from artde_gym.evaluation.evaluate import cells_of
+    from artde_gym.evaluation.cells import cells_of  # only when asked for
+    from artde_gym.evaluation.environments import single
     from artde_gym.play import HELP, Session
     from artde_gym.sim.window import open_window
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -51,15 +52,7 @@ def train(
         patience=patience,
         test_every=test_every,
     )
-    try:
-        if algo == "cma-es":
-            from baselines.tune_balance import tune as go
-        else:
-            from baselines.train import train as go
-    except ModuleNotFoundError as error:
-        if error.name not in ("cmaes", "stable_baselines3", "torch", "tensorboard"):
-            raise
-        raise OptionError("algo", algo, "what is installed; pip install 'artde-gym[rl]'") from error
+    go = _trainer(algo)
     columns = (TextColumn("decisions"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     bar = Progress(*columns, words("description"))
     shown = bar.add_task("", total=steps)
@@ -76,3 +69,17 @@ def train(
     print(f"best policy: {policy}")
     if report:
         show_report(out, terminal())
+
+
+def _trainer(algo: str) -> Callable[..., Path]:
+    """Find the function that trains with an algorithm; torch is heavy, and may not be installed."""
+    try:
+        if algo == "cma-es":
+            from baselines.tune_balance import tune as go
+        else:
+            from baselines.train import train as go
+    except ModuleNotFoundError as error:
+        if error.name not in ("cmaes", "stable_baselines3", "torch", "tensorboard"):
+            raise
+        raise OptionError("algo", algo, "what is installed; pip install 'artde-gym[rl]'") from error
+    return go

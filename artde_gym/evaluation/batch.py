@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -63,10 +63,8 @@ def run_batch(
     steps, total = np.zeros(len(seeds), dtype=np.int64), np.zeros(len(seeds))
     reasons: dict[int, str] = {}
 
-    def told() -> dict[str, Array]:
-        return {name: np.array(info[name][:traced]) for name in env.tracking.told}
-
-    observations, tales, diagnostics = [observation[:traced].copy()], [told()], []
+    traces = _Traces(env, traced, stride)
+    traces.observe(0, observation, info)
     block: list[Array] = []
     insides: list[dict[str, Array]] = []
     state, episode_start, k = None, live, 0
@@ -75,14 +73,11 @@ def run_batch(
         action, state = policy.predict(observation, state=state, episode_start=episode_start, deterministic=True)
         if diagnose is not None and k % looks == 0:
             insides.append(copied(diagnose(state)))
-            if traced and k % stride == 0:
-                diagnostics.append({name: values[:traced].copy() for name, values in insides[-1].items()})
+            traces.diagnose(k, insides[-1])
         observation, reward, terminated, truncated, info = env.step(action)
         k += 1
         total += np.where(live, reward, 0.0)
-        if traced and k % stride == 0:
-            observations.append(observation[:traced].copy())
-            tales.append(told())
+        traces.observe(k, observation, info)
         episode_start = terminated | truncated
         ended = live & episode_start
         if ended.any() or len(block) * len(seeds) >= BLOCK:
@@ -98,15 +93,38 @@ def run_batch(
 
     episodes = []
     for i, row in enumerate(metrics.rows(np.isin(np.arange(len(seeds)), list(reasons)))):
-        traces: dict[str, Array] = {}
-        if i < traced:
-            seen, decided = int(steps[i]) // stride + 1, int(steps[i] - 1) // stride + 1
-            fields = split(np.array([sample[i] for sample in observations[:seen]]))
-            known, own = (
-                stack([{name: values[i] for name, values in sample.items()} for sample in samples])
-                for samples in (tales[:seen], diagnostics[:decided])
-            )
-            traces = traces_of(stride * period, fields | known, own)
         row = row_of(reasons.get(i), float(steps[i] * period), float(total[i]), row, disturbances[i])
-        episodes.append(Episode(row, traces))
+        episodes.append(Episode(row, traces.of(i, int(steps[i])) if i < traced else {}))
     return episodes
+
+
+class _Traces:
+    """Signals of the first `count` episodes, every `stride` control periods."""
+
+    def __init__(self, env: Any, count: int, stride: int) -> None:
+        self._env, self._count, self._stride = env, count, stride
+        self._observations: list[Array] = []
+        self._told: list[dict[str, Array]] = []
+        self._diagnostics: list[dict[str, Array]] = []
+
+    def observe(self, step: int, observation: Array, info: Mapping[str, Any]) -> None:
+        """Keep what is seen after so many steps."""
+        if self._count and step % self._stride == 0:
+            self._observations.append(observation[: self._count].copy())
+            told = self._env.tracking.told
+            self._told.append({name: np.array(info[name][: self._count]) for name in told})
+
+    def diagnose(self, step: int, values: Mapping[str, Array]) -> None:
+        """Keep what the policy knew when it decided."""
+        if self._count and step % self._stride == 0:
+            self._diagnostics.append({name: value[: self._count].copy() for name, value in values.items()})
+
+    def of(self, episode: int, steps: int) -> dict[str, Array]:
+        """Return the traces of one episode of so many steps."""
+        seen, decided = steps // self._stride + 1, (steps - 1) // self._stride + 1
+        fields = self._env.observation_layout.split(np.array([sample[episode] for sample in self._observations[:seen]]))
+        known, own = (
+            stack([{name: values[episode] for name, values in sample.items()} for sample in samples])
+            for samples in (self._told[:seen], self._diagnostics[:decided])
+        )
+        return traces_of(self._stride * self._env.control_period, fields | known, own)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from artde_gym.disturbances import KINDS
@@ -18,6 +18,16 @@ EXACT = 2**53
 def name(text: str) -> str:
     """Write a name without surrounding space, in one of Unicode's forms."""
     return unicodedata.normalize("NFC", text.strip())
+
+
+def twice(names: Iterable[str]) -> str | None:
+    """Find a name that comes twice, in whatever spelling."""
+    seen: set[str] = set()
+    for text in names:
+        if name(text) in seen:
+            return text
+        seen.add(name(text))
+    return None
 
 
 def numbers(value: Any) -> Any:

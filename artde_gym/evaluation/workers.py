@@ -8,11 +8,12 @@ import functools
 import itertools
 import multiprocessing
 import os
+import pickle
 import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import connection
@@ -20,7 +21,7 @@ from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any
 
 from artde_gym.arguments import whole
-from artde_gym.errors import WorkerError
+from artde_gym.errors import OptionError, WorkerError
 
 AHEAD = 2
 """Jobs a worker that are handed out at once: no worker waits for its next one, and a million of them do not pile up."""
@@ -40,6 +41,15 @@ Work = Callable[[Job, Callable[[float], None]], Any]
 OnTime = Callable[[Job, float], None]
 Runs = Generator[tuple[Job, Any], None, None]
 """Jobs with their results."""
+
+
+def run_jobs(work: Work, jobs: Iterable[Job], workers: int, on_time: OnTime) -> Runs:
+    """Do the jobs in this process if one is asked for, else on so many.
+
+    Raises:
+        WorkerError: as `run_parallel`.
+    """
+    return run_here(work, jobs, on_time) if workers == 1 else run_parallel(work, jobs, workers, on_time)
 
 
 def run_here(work: Work, jobs: Iterable[Job], on_time: OnTime) -> Runs:
@@ -156,6 +166,20 @@ def check_workers(workers: Any) -> None:
     whole("workers", workers, 1, MOST_WORKERS)
     if getattr(multiprocessing.current_process(), "_inheriting", False):  # as multiprocessing itself asks
         sys.exit(UNGUARDED)
+
+
+def check_picklable(named: Mapping[str, Any], gains: Mapping[str, dict[str, Any]]) -> None:
+    """See that controllers can be sent to other processes.
+
+    Raises:
+        OptionError: if one cannot.
+    """
+    for name, item in named.items():
+        try:
+            pickle.dumps((item, gains.get(name)))
+        except Exception as error:  # pickling runs code of the policy's class
+            allowed = f"one that can be pickled, to be sent to several workers; or workers=1 ({error})"
+            raise OptionError(f"controller {name!r}", item, allowed) from error
 
 
 @contextlib.contextmanager

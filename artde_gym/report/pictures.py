@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 from PIL import Image
 
 from artde_gym.errors import ArtdeGymError
+from artde_gym.evaluation.cells import CUSTOM
 from artde_gym.evaluation.environments import robot_of
-from artde_gym.evaluation.evaluate import CUSTOM
 from artde_gym.evaluation.metrics import Span, events_of
 from artde_gym.kit import ROBOTS
 from artde_gym.registration import registered_controllers

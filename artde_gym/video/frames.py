@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artde_gym.evaluation.environments import drawing
-from artde_gym.evaluation.evaluate import policy_for
+from artde_gym.evaluation.gains import policy_for
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.info import fall_reason
 from artde_gym.registration import ControllerSpec

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from artde_gym.arguments import number, whole
 from artde_gym.errors import OptionError
+from artde_gym.evaluation.cells import Cell, tried
 from artde_gym.evaluation.environments import arguments_of
-from artde_gym.evaluation.evaluate import Cell, cells_of, checked_gains, named_controllers, tried
+from artde_gym.evaluation.plan import Plan
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.scenarios import SCENARIOS
@@ -78,9 +79,10 @@ def video(
     columns = None if columns is None else whole("columns", columns, 1)
     own_seed = episode_seed(whole("seed", seed, 0), whole("episode", episode, 0))
     writer.check(out)
-    named = named_controllers(controllers)
-    gains = checked_gains(gains, named)
-    (cell,) = cells_of(env_id, scenario, dict(env_kwargs or {}), disturbances)
+    plan = Plan.of(
+        controllers, env_id, scenario=scenario, seed=seed, disturbances=disturbances, env_kwargs=env_kwargs, gains=gains
+    )
+    (cell,) = plan.cells
     fps = writer.frame_rate(out, fps)
     _check_part(out, cell, start, end, speed / fps)
     films = {
@@ -88,12 +90,12 @@ def video(
             cell.env_id,
             cell.kwargs,
             policy,
-            gains.get(name, {}),
+            plan.gains.get(name, {}),
             own_seed,
             _times(start, end, speed / fps),
             width,
         )
-        for name, policy in named.items()
+        for name, policy in plan.controllers.items()
     }
     entry = SCENARIOS.get(cell.name)
     title = f"{entry.name}: {entry.text}" if entry else cell.env_id

@@ -17,9 +17,9 @@ from typer.testing import CliRunner
 from artde_gym.cli import app
 from artde_gym.errors import DisturbanceError, OptionError
 from artde_gym.evaluation import Result, evaluate
-from artde_gym.evaluation.evaluate import Update, chunks_of
+from artde_gym.evaluation.tasks import Update, chunks_of
 
-HARNESS = importlib.import_module("artde_gym.evaluation.evaluate")  # the package has the function by this name
+TASKS = importlib.import_module("artde_gym.evaluation.tasks")
 QUADROTOR = "QuadInfinity-Payload-v0"
 WINDY: dict[str, Any] = {
     "payload": {"mass": {"uniform": [0.33, 0.37]}, "position": [0.01, 0.0, -0.1], "drop": 1.0},
@@ -112,7 +112,7 @@ def test_chunks_and_workers_do_not_change_a_bit(
 ) -> None:
     whole = fly(disturbances=disturbances)
     for size, workers in ways:
-        monkeypatch.setattr(HARNESS, "CHUNK", size)
+        monkeypatch.setattr(TASKS, "CHUNK", size)
         same(whole, fly(disturbances=disturbances, workers=workers))
 
 
@@ -124,7 +124,7 @@ def test_more_episodes_leave_the_first_ones_as_they_were() -> None:
 
 
 def test_interruption_and_continuation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(HARNESS, "CHUNK", 3)
+    monkeypatch.setattr(TASKS, "CHUNK", 3)
 
     def interrupt(update: Update) -> None:
         if update.finished >= 5:
@@ -134,7 +134,7 @@ def test_interruption_and_continuation(tmp_path: Path, monkeypatch: pytest.Monke
     part = fly(controllers=["tde", "artde"], out=tmp_path / "part", on_progress=interrupt)
     assert not part.complete
     assert 0 < len(part.episodes) < len(whole.episodes)
-    monkeypatch.setattr(HARNESS, "CHUNK", 2048)  # what is left may come in other chunks
+    monkeypatch.setattr(TASKS, "CHUNK", 2048)  # what is left may come in other chunks
     resumed = fly(controllers=["tde", "artde"], out=tmp_path / "part")
     assert resumed.complete
     same(resumed, whole)
@@ -168,7 +168,7 @@ def test_traces_end_with_the_crash(tmp_path: Path) -> None:
 
 
 def test_progress_counts_episodes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(HARNESS, "CHUNK", 4)
+    monkeypatch.setattr(TASKS, "CHUNK", 4)
     seen: list[Update] = []
     fly(on_progress=seen.append)
     ended = [update.finished for update in seen if update.ended]

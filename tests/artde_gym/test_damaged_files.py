@@ -16,7 +16,7 @@ import pytest
 
 from artde_gym.errors import ArtdeGymError, OptionError, StoreError
 from artde_gym.evaluation import evaluate
-from artde_gym.evaluation.evaluate import Update
+from artde_gym.evaluation.tasks import Update
 from artde_gym.report import write_report
 from artde_gym.studies import frontier, sweep, tune
 from controllers import GainError

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from artde_gym.evaluation import evaluate
-from artde_gym.evaluation.evaluate import Update
+from artde_gym.evaluation.tasks import Update
 
 CASES: dict[str, dict[str, Any]] = {
     "biped in bullet": {"scenario": "S2-L4", "env_kwargs": {"duration": 0.4, "actuator_inertia": "lumped"}},

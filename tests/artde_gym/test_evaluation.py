@@ -23,8 +23,8 @@ from artde_gym.cli import app
 from artde_gym.errors import ArtdeGymError, DisturbanceError, OptionError, StoreError, UnknownNameError
 from artde_gym.evaluation import Result, evaluate, statistics, thesis
 from artde_gym.evaluation.console import print_result
-from artde_gym.evaluation.evaluate import Update
 from artde_gym.evaluation.seeds import episode_seed
+from artde_gym.evaluation.tasks import Update
 from artde_gym.robots.q450 import task as quadrotor_task
 from artde_gym.scenarios import SCENARIOS
 from artde_gym.studies import reproduce

@@ -21,14 +21,15 @@ from artde_gym.cli import app
 from artde_gym.disturbances import KINDS, Disturbances
 from artde_gym.errors import ArtdeGymError, DisturbanceError, OptionError, StoreError, UnknownNameError
 from artde_gym.evaluation import statistics
-from artde_gym.evaluation.evaluate import Update
+from artde_gym.evaluation.tasks import Update
 from artde_gym.palette import LOOKS, OTHERS, looks
 from artde_gym.studies import Frontier, frontier
 from artde_gym.studies.frontier.axis import Axis, axis
+from artde_gym.studies.frontier.bisection import search
 from artde_gym.studies.frontier.figure import draw
 from artde_gym.studies.frontier.result import value_text
-from artde_gym.studies.frontier.search import LEVEL_COLUMNS, TABLE_COLUMNS, _frontier, search
 from artde_gym.studies.frontier.standard import standard_for, standard_test
+from artde_gym.studies.frontier.table import LEVEL_COLUMNS, TABLE_COLUMNS, frontier_of
 
 PUSH = "BipedPush-v0"
 QUADROTOR = "QuadInfinity-Payload-v0"
@@ -63,7 +64,7 @@ def known(varied: Axis, edges: dict[str, float], runs: list[float] | None = None
         return survived
 
     search(len(varied.levels), list(edges), run)
-    return _frontier(varied, list(edges), rows, 0.9, None, complete=True)
+    return frontier_of(varied, list(edges), rows, 0.9, None, complete=True)
 
 
 # ---------------------------------------------------------------- bisection

@@ -24,35 +24,28 @@ falls and rises again between them stays unseen.
 from __future__ import annotations
 
 import dataclasses
-import json
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pandas as pd
-
-from artde_gym.errors import OptionError, among
 from artde_gym.evaluation import statistics
-from artde_gym.evaluation.environments import Backend, arguments_of, with_engine
-from artde_gym.evaluation.evaluate import CUSTOM, Cell, Update, checked_gains, evaluate, labelled, tried
+from artde_gym.evaluation.cells import CUSTOM
+from artde_gym.evaluation.environments import Backend
+from artde_gym.evaluation.evaluate import run_plan
 from artde_gym.evaluation.lock import writes_folder
-from artde_gym.evaluation.provenance import MIXED, continued, provenance
+from artde_gym.evaluation.plan import Plan
 from artde_gym.evaluation.rollout import Policy
-from artde_gym.evaluation.store import claim, plain_configuration, write_atomically
-from artde_gym.evaluation.workers import check_workers
+from artde_gym.evaluation.tasks import Update
 from artde_gym.kit import Harder
-from artde_gym.studies.frontier.axis import Axis, axis
-from artde_gym.studies.frontier.result import RECORD, Frontier
-from artde_gym.studies.frontier.standard import standard_test
+from artde_gym.studies.frontier.axis import axis
+from artde_gym.studies.frontier.bisection import search
+from artde_gym.studies.frontier.design import Design
+from artde_gym.studies.frontier.result import Frontier
+from artde_gym.studies.frontier.store import FrontierStore
+from artde_gym.studies.frontier.table import LEVEL_COLUMNS, frontier_of
 
 TRACE_HZ = 10.0  # a frontier has hundreds of episodes; their traces are for a look at a fall, not for metrics
-LEVEL_COLUMNS = ["value", "controller", "episodes", "survived", "rate", "low", "high"]
-TABLE_COLUMNS = ["controller", "relation", "frontier", "low", "high"]
-TABLE_COLUMNS += [f"{end}_rate{part}" for end in ("low", "high") for part in ("", "_from", "_to")]
-
-Outcomes = Mapping[int, bool]
-"""Grid index -> whether the level was survived."""
 
 
 @writes_folder
@@ -105,211 +98,90 @@ def frontier(
         UnknownNameError, OptionError, DisturbanceError, GainError: for a bad argument, before the first episode.
         StoreError: if `out` holds other results, or results of other software, or is written by another process.
     """
-    check_workers(workers)
-    if not (isinstance(survival, (int, float)) and 0 < survival <= 1):
-        raise OptionError("survival", survival, "above 0 up to 1")
-    named = labelled(controllers)
-    gains = checked_gains(gains, named)
-    varied = axis(env_id, vary, low, high, tolerance, harder)
-    arguments = _arguments(env_id, backend, varied, env_kwargs or {})
-    if disturbances is None:
-        disturbances, arguments = standard_test(env_id, varied.path, arguments)
-    if not isinstance(disturbances, Mapping):
-        raise OptionError("disturbances", disturbances, "a mapping of kinds to their parameters")
-    grid = varied.levels
-    placed = {value: varied.place(value, disturbances, arguments) for value in (grid[0], grid[-1])}
-    if varied.kind is None:  # nothing here knows the argument's range: let the environment refuse it at once
-        for _, end in placed.values():
-            tried("single", Cell(CUSTOM, env_id, end))
+    plan = Plan.of(
+        controllers,
+        env_id,
+        episodes=episodes,
+        seed=seed,
+        workers=workers,
+        disturbances=disturbances,
+        env_kwargs=env_kwargs,
+        gains=gains,
+        backend=backend,
+        trace_hz=TRACE_HZ,
+        allow_mixed=allow_mixed,
+    )
+    design = Design.of(plan, axis(plan.cells[0].env_id, vary, low, high, tolerance, harder), survival)
+    store = None if out is None else FrontierStore(Path(out), _configuration(plan, design), allow_mixed)
+    return _Levels(plan, design, store, on_progress).search()
 
-    configuration = {
-        "env": env_id,
-        "axis": dataclasses.asdict(varied),
-        "controllers": list(named),  # what they stand for is checked by the folders of the levels
-        "survival": survival,
-        "episodes": episodes,
-        "seed": seed,
-        "disturbances": disturbances,
-        "env_kwargs": arguments,
-        "gains": gains,
-        "backend": backend,
+
+def _configuration(plan: Plan, design: Design) -> dict[str, Any]:
+    return {
+        "env": plan.cells[0].env_id,
+        "axis": dataclasses.asdict(design.axis),
+        "controllers": list(plan.controllers),  # what they stand for is checked by the folders of the levels
+        "survival": design.survival,
+        "episodes": plan.episodes,
+        "seed": plan.seed,
+        "disturbances": design.disturbances,
+        "env_kwargs": design.arguments,
+        "gains": plan.gains,
+        "backend": plan.backend,
     }
-    folder = None if out is None else _Folder(Path(out), configuration, allow_mixed)
-    rows: list[dict[str, Any]] = []
 
-    def run(index: int, names: list[str]) -> dict[str, bool]:
-        value = grid[index]
 
-        def report(update: Update) -> None:
-            if on_progress is not None:
-                on_progress(value, update)
+class _Levels:
+    """The levels of a frontier, run where the bisection asks for them."""
 
-        here, kwargs = varied.place(value, disturbances, arguments)
-        result = evaluate(
-            {name: named[name] for name in names},
-            env_id,
-            episodes=episodes,
-            seed=seed,
-            workers=workers,
-            out=None if folder is None else folder.level(value),
-            disturbances=here,
-            env_kwargs=kwargs,
-            gains={name: gains[name] for name in names if name in gains},
-            backend=backend,
-            trace_hz=TRACE_HZ,
-            allow_mixed=allow_mixed,
-            on_progress=report,
-        )
+    def __init__(
+        self,
+        plan: Plan,
+        design: Design,
+        store: FrontierStore | None,
+        on_progress: Callable[[float, Update], None] | None,
+    ) -> None:
+        self._plan, self._design, self._store, self._on_progress = plan, design, store, on_progress
+        self._rows: list[dict[str, Any]] = []
+
+    def search(self) -> Frontier:
+        """Run the levels until all brackets are found, or the user interrupts."""
+        complete = True
+        try:
+            search(len(self._design.axis.levels), list(self._plan.controllers), self._run)
+        except KeyboardInterrupt:
+            complete = False
+        except Exception:
+            if self._store is not None:
+                self._store.abandon()
+            raise
+        found = self._found(complete)
+        if self._store is not None:
+            self._store.write(found)
+            if self._rows:
+                self._store.draw(found)
+        return found
+
+    def _run(self, index: int, names: list[str]) -> dict[str, bool]:
+        """Run a level with some of the controllers, and say which of them survived it."""
+        value = self._design.axis.levels[index]
+        plan = self._plan.only(names, self._design.at(value, self._plan.cells[0]))
+        folder = None if self._store is None else self._store.level(value)
+        result = run_plan(plan, folder, self._on_progress and functools.partial(self._on_progress, value))
         if not result.complete:
             raise KeyboardInterrupt
         survived: dict[str, bool] = {}
         for name in names:
             falls, rate = result.falls(CUSTOM, name)
             share = statistics.rate(rate.n - falls, rate.n)
-            survived[name] = share.value >= survival
-            rows.append(dict(zip(LEVEL_COLUMNS, (value, name, rate.n, rate.n - falls, *share[:3]), strict=True)))
-        if folder is not None:
-            folder.write(_frontier(varied, list(named), rows, survival, folder.path, complete=False))
+            survived[name] = share.value >= self._design.survival
+            row = (value, name, rate.n, rate.n - falls, *share[:3])
+            self._rows.append(dict(zip(LEVEL_COLUMNS, row, strict=True)))
+        if self._store is not None:
+            self._store.write(self._found(complete=False))
         return survived
 
-    complete = True
-    try:
-        search(len(grid), list(named), run)
-    except KeyboardInterrupt:
-        complete = False
-    except Exception:
-        if folder is not None:
-            folder.abandon()
-        raise
-    found = _frontier(varied, list(named), rows, survival, None if folder is None else folder.path, complete)
-    if folder is not None:
-        folder.write(found)
-        if rows:
-            from artde_gym.studies.frontier.figure import draw  # Matplotlib takes long: not at each start of a worker
-
-            write_atomically(folder.path / "frontier.png", lambda file: draw(found, file))
-    return found
-
-
-def search(
-    size: int, names: Sequence[str], run: Callable[[int, list[str]], Mapping[str, bool]]
-) -> dict[str, dict[int, bool]]:
-    """Bisect for each name on the levels 0 (easiest) to size - 1 (hardest), size >= 2.
-
-    All searches go on in step. As a level can come up at one depth of a bisection only, all that need it ask for it at
-    the same time: `run(level, names)`, which returns whether each of them survived, is called at most once a level.
-    """
-    outcomes: dict[str, dict[int, bool]] = {name: {} for name in names}
-    while True:
-        wanted: dict[int, list[str]] = {}
-        for name in names:
-            level = _next(outcomes[name], size)
-            if level is not None:
-                wanted.setdefault(level, []).append(name)
-        if not wanted:
-            return outcomes
-        for level in sorted(wanted):
-            for name, survived in run(level, wanted[level]).items():
-                outcomes[name][level] = survived
-
-
-def bracket(outcomes: Outcomes) -> tuple[int | None, int | None]:
-    """Hardest level survived and easiest one failed, None where there is none: a bisection keeps the first below."""
-    return (
-        max((level for level, survived in outcomes.items() if survived), default=None),
-        min((level for level, survived in outcomes.items() if not survived), default=None),
-    )
-
-
-def _next(outcomes: Outcomes, size: int) -> int | None:
-    survived, failed = bracket(outcomes)
-    if failed is None:
-        return 0 if survived is None else size - 1 if survived < size - 1 else None
-    if survived is None or failed - survived == 1:
-        return None
-    return (survived + failed) // 2
-
-
-def _frontier(
-    varied: Axis, names: list[str], rows: list[dict[str, Any]], survival: float, folder: Path | None, complete: bool
-) -> Frontier:
-    order = {name: i for i, name in enumerate(names)}
-    ordered = sorted(rows, key=lambda row: (row["value"], order[row["controller"]]))
-    table = [_summary(varied, name, [row for row in rows if row["controller"] == name], survival) for name in names]
-    return Frontier(
-        pd.DataFrame(table, columns=TABLE_COLUMNS),
-        pd.DataFrame(ordered, columns=LEVEL_COLUMNS),
-        varied,
-        survival,
-        folder,
-        complete,
-    )
-
-
-def _summary(varied: Axis, name: str, rows: list[dict[str, Any]], survival: float) -> tuple[Any, ...]:
-    """One row of the table, from the levels of one controller."""
-    grid = varied.levels
-    by_level = {grid.index(row["value"]): row for row in rows}
-    survived, failed = bracket({level: row["rate"] >= survival for level, row in by_level.items()})
-    larger = varied.harder == "larger"
-    relation, value = "", np.nan
-    if survived is not None and failed is not None and failed - survived == 1:
-        relation, value = "=", grid[survived]
-    elif survived == len(grid) - 1:
-        relation, value = ">=" if larger else "<=", grid[-1]
-    elif failed == 0:
-        relation, value = "<" if larger else ">", grid[0]
-    below, above = (survived, failed) if larger else (failed, survived)
-    ends = [np.nan if level is None else grid[level] for level in (below, above)]
-    rates = [
-        [np.nan] * 3 if level is None else [by_level[level][part] for part in ("rate", "low", "high")]
-        for level in (below, above)
-    ]
-    return (name, relation, value, *ends, *rates[0], *rates[1])
-
-
-def _arguments(env_id: str, backend: Backend, varied: Axis, given: Mapping[str, Any]) -> dict[str, Any]:
-    known = arguments_of(env_id, backend)
-    for name in given:
-        if name not in known:
-            raise OptionError(f"argument of {env_id}", name, among(name, known))
-        if name == "disturbances" or (varied.kind is None and name == varied.name):
-            raise OptionError("env_kwargs", name, "arguments that are not varied; disturbances are given on their own")
-    return with_engine(env_id, given, backend)
-
-
-class _Folder:
-    """The folder of one frontier, claimed by its record."""
-
-    def __init__(self, path: Path, configuration: Mapping[str, Any], allow_mixed: bool) -> None:
-        self.path = path
-        self._configuration = plain_configuration(configuration)
-        before = claim(path, RECORD, self._configuration)
-        begun = before if (path / "levels").exists() else None
-        self._provenance = continued(path, begun, provenance(), allow_mixed=allow_mixed)
-        if before is None or MIXED in self._provenance:
-            self._write_record(None)
-
-    def level(self, value: float) -> Path:
-        return self.path / "levels" / f"{value:.10g}"
-
-    def write(self, found: Frontier) -> None:
-        for name, frame in (("frontier.csv", found.table), ("levels.csv", found.levels)):
-            text = frame.to_csv(index=False, lineterminator="\n")
-            write_atomically(self.path / name, lambda file, text=text: file.write(text.encode()))
-        self._write_record(found)
-
-    def abandon(self) -> None:
-        """Give a folder back in which nothing was run, after an argument that `evaluate` refused."""
-        if not (self.path / "levels").exists():
-            (self.path / RECORD).unlink(missing_ok=True)
-
-    def _write_record(self, found: Frontier | None) -> None:
-        record = {
-            "configuration": self._configuration,
-            "provenance": self._provenance,
-            "complete": found is not None and found.complete,
-            "frontier": [] if found is None else json.loads(str(found.table.to_json(orient="records"))),
-        }
-        text = json.dumps(record, indent=2) + "\n"
-        write_atomically(self.path / RECORD, lambda file: file.write(text.encode()))
+    def _found(self, complete: bool) -> Frontier:
+        folder = None if self._store is None else self._store.path
+        names = list(self._plan.controllers)
+        return frontier_of(self._design.axis, names, self._rows, self._design.survival, folder, complete)

@@ -12,18 +12,22 @@ What ARTDE is better than that, it owes to adaptation.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from artde_gym.errors import OptionError, UnknownNameError, among
-from artde_gym.evaluation.evaluate import Update, evaluate
+from artde_gym.evaluation.cells import Cell
+from artde_gym.evaluation.evaluate import run_plan
+from artde_gym.evaluation.labels import named_controllers
 from artde_gym.evaluation.lock import writes_folder
+from artde_gym.evaluation.plan import Plan
 from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.store import write_atomically
+from artde_gym.evaluation.tasks import Update
 from artde_gym.kit import ROBOTS, RobotKit
 from artde_gym.scenarios import scenario as find_scenario
 from artde_gym.studies.reproduce.claims import CLAIMS, judge
@@ -110,40 +114,37 @@ def reproduce(
         raise OptionError("controllers", ABLATION, "other names; it is run by ablation=True, at gains of its own")
     if ablation and ADAPTIVE not in names:
         raise OptionError("controllers", names, f"{ADAPTIVE!r} among them, from which the ablation takes its gain")
+    plan = Plan.of(
+        names,
+        scenario=chosen,
+        episodes=episodes,
+        seed=seed,
+        workers=workers,
+        env_kwargs={"engine": engine},
+        traced=TRACED,
+        allow_mixed=allow_mixed,
+    )
     folder = Path(out)
-
-    def run(what: str, controllers: list[str], scenario: Sequence[str], where: Path, gains: Any = None) -> Result:
-        def report(update: Update) -> None:
-            if on_progress is not None:
-                on_progress(what, update)
-
-        return evaluate(
-            controllers,
-            scenario=scenario,
-            episodes=episodes,
-            seed=seed,
-            workers=workers,
-            out=where,
-            env_kwargs={"engine": engine},
-            gains=gains,
-            traced=TRACED,
-            allow_mixed=allow_mixed,
-            on_progress=report,
-        )
-
-    result = run("episodes", names, chosen, folder)
-    if ablation:
-        for name in chosen:
-            if not result.complete:
-                break
-            gains = {ABLATION: equivalent_gains(result, name)}
-            part = run(f"ablation in {name}", [ABLATION], [name], folder / "ablation" / name, gains)
-            result = Result(pd.concat([result.episodes, part.episodes]), folder, part.complete)
+    result = run_plan(plan, folder, on_progress and functools.partial(on_progress, "episodes"))
+    for cell in plan.cells if ablation else ():
+        if result.complete:
+            result = _with_ablation(result, plan, cell, folder, on_progress)
     made = [claim for claim in CLAIMS if claim.scenario in result.scenarios and (ablation or not claim.ablation)]
     verdicts = judge(result, made)
     text = verdicts.to_csv(index=False, lineterminator="\n")
     write_atomically(folder / "claims.csv", lambda file: file.write(text.encode()))
     return Reproduction(result, verdicts)
+
+
+def _with_ablation(
+    result: Result, plan: Plan, cell: Cell, folder: Path, on_progress: Callable[[str, Update], None] | None
+) -> Result:
+    """Add episodes of the ablation in one scenario to a result."""
+    gains = {ABLATION: equivalent_gains(result, cell.name)}
+    own = dataclasses.replace(plan, controllers=named_controllers([ABLATION]), cells=(cell,), gains=gains)
+    news = on_progress and functools.partial(on_progress, f"ablation in {cell.name}")
+    part = run_plan(own, folder / "ablation" / cell.name, news)
+    return Result(pd.concat([result.episodes, part.episodes]), folder, part.complete)
 
 
 def equivalent_gains(result: Result, scenario: str) -> dict[str, float]:

@@ -37,8 +37,8 @@ import numpy as np
 from artde_gym.disturbances import KINDS
 from artde_gym.errors import OptionError, UnknownNameError, among
 from artde_gym.evaluation import canonical
+from artde_gym.evaluation.cells import Cell, cells_of
 from artde_gym.evaluation.environments import Backend
-from artde_gym.evaluation.evaluate import Cell, cells_of
 from artde_gym.evaluation.identity import identity_of
 from artde_gym.registration import ControllerSpec, registered_controllers
 from artde_gym.scenarios import scenario as find_scenario

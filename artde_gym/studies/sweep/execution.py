@@ -7,6 +7,7 @@ which order and after how many interruptions makes no difference.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -15,23 +16,13 @@ from typing import Any, Literal, get_args
 import pandas as pd
 
 from artde_gym.errors import ArtdeGymError, OptionError, StoreError, among
-from artde_gym.evaluation.evaluate import (
-    CHUNK,
-    Task,
-    Update,
-    check_picklable,
-    chunks_of,
-    duration_of,
-    labels_of,
-    policy_for,
-    run_task,
-    tried,
-)
+from artde_gym.evaluation.cells import tried
+from artde_gym.evaluation.gains import policy_for
 from artde_gym.evaluation.identity import behind
 from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.rollout import Episode
-from artde_gym.evaluation.seeds import episode_seed
-from artde_gym.evaluation.workers import Runs, check_workers, run_here, run_parallel
+from artde_gym.evaluation.tasks import Case, Progress, Task, Update, labels_of, run_task, task_of, tasks_of
+from artde_gym.evaluation.workers import Runs, check_picklable, check_workers, run_jobs
 from artde_gym.studies.sweep import parquet
 from artde_gym.studies.sweep.design import Design, Point, design, read
 from artde_gym.studies.sweep.ray_workers import check_address, run_on_ray
@@ -39,9 +30,6 @@ from artde_gym.studies.sweep.store import Key, SweepStore, read_sweep
 
 Executor = Literal["local", "ray"]
 """Processes of this machine, or a Ray cluster."""
-
-TRACE_HZ = 100.0
-"""`evaluate` has it where nothing else is asked for; policies are asked for what some metrics need at this rate."""
 
 OnProgress = Callable[[str, Update], None]
 
@@ -95,6 +83,33 @@ def sweep(
         WorkerError: if workers keep ending before their episodes do.
     """
     check_workers(workers)
+    _check_executor(executor, address)
+    plan = design(read(given) if isinstance(given, (str, Path)) else given)
+    if workers > 1 or executor == "ray":
+        check_picklable({point.controller: point.spec for point in plan.points}, {})
+    types = parquet.types_of(point.columns for point in plan.points)
+    points = {f"{point.cell.name} [{i}]": point for i, point in enumerate(plan.points)}
+    complete = True
+    with SweepStore(Path(out)) as store:
+        _refuse_others(plan, store)
+        _check(plan, points, store.done, on_progress)
+        store.begin(plan.text, types, _behind(plan), allow_mixed=allow_mixed)
+        total = len(points) * plan.episodes
+        progress = Progress(len(store.done), total, on_progress and functools.partial(on_progress, "episodes"))
+
+        def on_time(task: Task, time: float) -> None:
+            store.due()
+            progress.running(task, time)
+
+        if len(store.done) < total:
+            runs = _runs(_tasks(plan, points, store.done), workers, executor, address, on_time, store.due)
+            complete = _keep(runs, store, points, progress)
+        if complete:
+            store.finish()
+    return Sweep(read_sweep(out), Path(out), complete, tuple(path.name for path in store.set_aside))
+
+
+def _check_executor(executor: Any, address: Any) -> None:
     if executor not in get_args(Executor):
         allowed = f"{among(executor, get_args(Executor))}; a physics engine is an argument of environments (env_kwargs)"
         raise OptionError("executor", executor, allowed)
@@ -103,38 +118,6 @@ def sweep(
     parquet.pyarrow()
     if address is not None:
         check_address(address)
-    plan = design(read(given) if isinstance(given, (str, Path)) else given)
-    if workers > 1 or executor == "ray":
-        check_picklable({point.controller: point.spec for point in plan.points}, {})
-    types = parquet.types_of(point.columns for point in plan.points)
-    points = {f"{point.cell.name} [{i}]": point for i, point in enumerate(plan.points)}
-    report = on_progress or (lambda *_: None)
-    complete = True
-    with SweepStore(Path(out)) as store:
-        _refuse_others(plan, store)
-        _check(plan, points, store.done, report)
-        store.begin(plan.text, types, _behind(plan), allow_mixed=allow_mixed)
-        total = len(points) * plan.episodes
-        finished = len(store.done)
-
-        def on_time(task: Task, time: float) -> None:
-            store.due()
-            report("episodes", Update(task, time, False, finished, total))
-
-        if finished < total:
-            runs = _runs(_tasks(plan, points, store.done), workers, executor, address, on_time, store.due)
-            try:
-                for task, results in runs:
-                    store.add(_rows(points[task.cell.name], task, results))
-                    finished += len(results)
-                    report("episodes", Update(task, duration_of(results), True, finished, total))
-            except KeyboardInterrupt:
-                complete = False
-            finally:
-                runs.close()
-        if complete:
-            store.finish()
-    return Sweep(read_sweep(out), Path(out), complete, tuple(path.name for path in store.set_aside))
 
 
 def _runs(
@@ -147,7 +130,20 @@ def _runs(
 ) -> Runs:
     if executor == "ray":
         return run_on_ray(_run, tasks, workers, address, on_wait)
-    return run_here(_run, tasks, on_time) if workers == 1 else run_parallel(_run, tasks, workers, on_time)
+    return run_jobs(_run, tasks, workers, on_time)
+
+
+def _keep(runs: Runs, store: SweepStore, points: Mapping[str, Point], progress: Progress) -> bool:
+    """Store episodes as they are finished; return False if interrupted."""
+    try:
+        for task, results in runs:
+            store.add(_rows(points[task.cell.name], task, results))
+            progress.ended(task, results)
+    except KeyboardInterrupt:
+        return False
+    finally:
+        runs.close()
+    return True
 
 
 def _run(task: Task, on_time: Callable[[float], None]) -> list[Episode]:
@@ -171,7 +167,7 @@ def _refuse_others(plan: Design, store: SweepStore) -> None:
         raise StoreError("sweep folder", str(store.folder), allowed)
 
 
-def _check(plan: Design, points: Mapping[str, Point], done: set[Key], report: OnProgress) -> None:
+def _check(plan: Design, points: Mapping[str, Point], done: set[Key], on_progress: OnProgress | None) -> None:
     """Build everything once, so that a bad cell shows before the first episode; cells with episodes have been tried."""
     begun = {cell for cell, _ in done}
     fresh = [(name, point) for name, point in points.items() if point.id not in begun]
@@ -181,7 +177,9 @@ def _check(plan: Design, points: Mapping[str, Point], done: set[Key], report: On
         if _place(point) != last:
             last, env = _place(point), tried(plan.backend, point.cell)
         policy_for(point.spec, env, point.gains)
-        report("cells checked", Update(_task(plan, name, point, [0]), 0.0, True, i, len(fresh)))
+        if on_progress is not None:
+            task = task_of(_case(name, point), [0], plan.backend)
+            on_progress("cells checked", Update(task, 0.0, True, i, len(fresh)))
 
 
 def _behind(plan: Design) -> dict[str, str]:
@@ -201,26 +199,14 @@ def _place(point: Point) -> tuple[str, str, str]:
 
 
 def _tasks(plan: Design, points: Mapping[str, Point], done: set[Key]) -> Iterator[Task]:
-    """What is left to run, episode by episode, so that an interruption leaves whole comparisons behind."""
-    for chunk in chunks_of(plan.episodes, 1 if plan.backend == "single" else CHUNK):
-        for name, point in points.items():
-            left = [episode for episode in chunk if (point.id, episode) not in done]
-            if left:
-                yield _task(plan, name, point, left)
+    """Return what is left to run."""
+    names = {point.id: (name, point.controller) for name, point in points.items()}
+    finished = {(*names[cell], episode) for cell, episode in done}
+    return tasks_of([_case(name, point) for name, point in points.items()], plan.episodes, plan.backend, finished)
 
 
-def _task(plan: Design, name: str, point: Point, episodes: list[int]) -> Task:
-    return Task(
-        plan.backend,
-        point.cell._replace(name=name),
-        point.controller,
-        point.spec,
-        point.gains,
-        episodes,
-        [episode_seed(point.seed, episode) for episode in episodes],
-        TRACE_HZ,
-        traced=0,
-    )
+def _case(name: str, point: Point) -> Case:
+    return Case(point.cell._replace(name=name), point.controller, point.spec, point.gains, point.seed)
 
 
 def _rows(point: Point, task: Task, results: list[Episode]) -> Iterator[dict[str, Any]]:

@@ -17,10 +17,9 @@ number of processes, and for a run that was interrupted and continued.
 
 from __future__ import annotations
 
-import csv
 import dataclasses
+import functools
 import json
-import zlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -28,28 +27,27 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from artde_gym.arguments import reading, whole
-from artde_gym.errors import OptionError, StoreError
+from artde_gym.arguments import whole
+from artde_gym.errors import OptionError
+from artde_gym.evaluation import canonical
 from artde_gym.evaluation.environments import Backend, single, tracking_of, with_engine
-from artde_gym.evaluation.evaluate import DEFAULT_ENVIRONMENT, MOST_EPISODES, Update, evaluate, policy_for
+from artde_gym.evaluation.evaluate import run_plan
+from artde_gym.evaluation.gains import policy_for
 from artde_gym.evaluation.identity import behind
-from artde_gym.evaluation.lock import is_empty, writes_folder
-from artde_gym.evaluation.provenance import MIXED, continued, provenance
+from artde_gym.evaluation.labels import labelled
+from artde_gym.evaluation.lock import writes_folder
+from artde_gym.evaluation.plan import MOST_EPISODES, Plan
 from artde_gym.evaluation.result import Result
-from artde_gym.evaluation.store import claim, plain_configuration, write_atomically
-from artde_gym.evaluation.workers import check_workers
-from artde_gym.registration import GainRange, registered_controllers, search_space
-from artde_gym.scenarios import scenario as find_scenario
+from artde_gym.evaluation.tasks import Update
+from artde_gym.registration import registered_controllers, search_space
+from artde_gym.studies.tune.proposer import Gains, Proposer
+from artde_gym.studies.tune.store import TRIAL_COLUMNS, TuningStore, frame_of
 
-RECORD = "tuning.json"
 TUNED = "-tuned"
 """What is added to a controller's name where its tuned gains are meant."""
 MOST_TRIALS = 10_000
 FALL = 1000.0
 """Cost of a fall, in the unit of the error."""
-TRIAL_COLUMNS = ["controller", "trial", "cost", "error", "falls", "gains"]
-
-Gains = dict[str, float]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,68 +107,107 @@ def tune(
         UnknownNameError, OptionError, DisturbanceError: for a bad argument, before the first trial.
         StoreError: if `out` holds other results, or results of other software, or is written by another process.
     """
-    check_workers(workers)
-    for name, count in (("trials", trials), ("episodes", episodes), ("held_out", held_out)):
-        whole(name, count, 1, MOST_TRIALS if name == "trials" else MOST_EPISODES)
-    whole("seed", seed, 0)
-    if isinstance(controllers, str) or not controllers:
-        raise OptionError("controllers", controllers, "a list of names")
-    if len(set(controllers)) < len(controllers):
-        raise OptionError("controllers", controllers, "each name once")
-    compared = {label: name for name in controllers for label in (name, name + TUNED)}
-    if len(compared) < 2 * len(controllers):
-        raise OptionError("controllers", controllers, f"names that differ by more than {TUNED!r}")
-    proposer = _Proposer(seed)
-    env_id = env_id or (DEFAULT_ENVIRONMENT if scenario is None else find_scenario(scenario).env_id)
-    error = tracking_of(env_id).errors[0]
-    metric = f"rmse_{error.unit}"
-    spaces = {name: search_space(name, single(env_id, json.dumps({}))) for name in controllers}
-    common: dict[str, Any] = {
+    whole("trials", trials, 1, MOST_TRIALS)
+    whole("held_out", held_out, 1, MOST_EPISODES)
+    names = _names(controllers)
+    plan = Plan.of(
+        names,
+        env_id,
+        scenario=_one_scenario(scenario),
+        episodes=episodes,
+        seed=seed,
+        workers=workers,
+        disturbances=disturbances,
+        env_kwargs=env_kwargs,
+        backend=backend,
+        allow_mixed=allow_mixed,
+    )
+    env_id = plan.cells[0].env_id
+    search = _Search(plan, on_progress)
+    configuration = {
+        "env": env_id,
         "scenario": scenario,
         "disturbances": disturbances,
         "env_kwargs": with_engine(env_id, env_kwargs or {}, backend),
         "backend": backend,
-    }
-    configuration = {
-        "env": env_id,
-        **common,
-        "controllers": {name: {gain: list(where) for gain, where in space.items()} for name, space in spaces.items()},
+        "controllers": {name: {gain: list(at) for gain, at in space.items()} for name, space in search.spaces.items()},
         "trials": trials,
         "episodes": episodes,
         "held_out": held_out,
         "seed": seed,
     }
-    folder = None if out is None else _Folder(Path(out), configuration, _behind(controllers, env_id), allow_mixed)
-    rows = [] if folder is None else folder.rows
+    store = None if out is None else TuningStore(Path(out), configuration, _behind(names, env_id), allow_mixed)
+    return search.run(trials, held_out, store)
 
-    def run(what: str, labels: Mapping[str, str], gains: Mapping[str, Gains], **options: Any) -> Result:
-        def report(update: Update) -> None:
-            if on_progress is not None:
-                on_progress(what, update)
 
-        return evaluate(labels, env_id, gains=gains, workers=workers, on_progress=report, **common, **options)
+def _names(controllers: Any) -> list[str]:
+    """Return the controllers, if they can be told from their tuned selves."""
+    names = labelled(controllers)
+    for name, item in names.items():
+        if name != item:
+            raise OptionError("controllers", item, "registered names: an object has its own gains")
+    if canonical.twice([*names, *(name + TUNED for name in names)]):
+        raise OptionError("controllers", list(names), f"names that differ by more than {TUNED!r}")
+    return list(names)
 
-    for number in range(trials):
+
+def _one_scenario(scenario: Any) -> str | None:
+    if not (scenario is None or isinstance(scenario, str)):
+        raise OptionError("scenario", scenario, "one name, or None")
+    return scenario
+
+
+class _Search:
+    """The trials of all controllers, and the comparison in the end."""
+
+    def __init__(self, plan: Plan, on_progress: Callable[[str, Update], None] | None) -> None:
+        env_id = plan.cells[0].env_id
+        self._plan, self._on_progress = plan, on_progress
+        self._proposer = Proposer(plan.seed)
+        self.metric = f"rmse_{tracking_of(env_id).errors[0].unit}"
+        self.spaces = {name: search_space(name, single(env_id, json.dumps({}))) for name in plan.controllers}
+
+    def run(self, trials: int, held_out: int, store: TuningStore | None) -> Tuning:
+        """Run what a store does not hold yet; None to keep nothing."""
+        rows, folder = ([], None) if store is None else (store.rows, store.path)
+        for number in range(trials):
+            if not self._try(number, trials, rows, store):
+                return Tuning(frame_of(rows), self.metric, _best(rows), None, folder, complete=False)
+        best = _best(rows)
+        result = self._compare(best, held_out, folder)
+        if store is not None:
+            store.finish(best, result.complete)
+        return Tuning(frame_of(rows), self.metric, best, result, folder, result.complete)
+
+    def _try(self, number: int, trials: int, rows: list[dict[str, Any]], store: TuningStore | None) -> bool:
+        """Add one trial of each controller that has not had it; return False if interrupted."""
         done = {row["controller"] for row in rows if row["trial"] == number}
-        left = [name for name in controllers if name not in done]
-        gains = {name: proposer.propose(name, spaces[name], _history(rows, name), number) for name in left}
+        left = {name: item for name, item in self._plan.controllers.items() if name not in done}
+        gains = {name: self._proposer.propose(name, self.spaces[name], _history(rows, name), number) for name in left}
         if not left:
-            continue
-        result = run(
-            f"trial {number + 1} of {trials}", {name: name for name in left}, gains, episodes=episodes, seed=seed
+            return True
+        plan = dataclasses.replace(self._plan, controllers=left, gains=gains)
+        result = run_plan(plan, on_progress=self._news(f"trial {number + 1} of {trials}"))
+        if result.complete:
+            rows += [_row(result, name, number, self.metric, gains[name]) for name in left]
+            if store is not None:
+                store.write(rows)
+        return result.complete
+
+    def _compare(self, best: Mapping[str, Gains], episodes: int, folder: Path | None) -> Result:
+        """Compare tuned gains with presets on seeds of their own."""
+        known = self._plan.controllers
+        plan = dataclasses.replace(
+            self._plan,
+            controllers={label: known[name] for name in known for label in (name, name + TUNED)},
+            gains={name + TUNED: best[name] for name in known},
+            episodes=episodes,
+            seed=self._plan.seed + 1,
         )
-        if not result.complete:
-            return Tuning(_frame(rows), metric, _best(rows), None, None if folder is None else folder.path, False)
-        rows += [_row(result, name, number, metric, gains[name]) for name in left]
-        if folder is not None:
-            folder.write(rows)
-    best = _best(rows)
-    tuned = {name + TUNED: best[name] for name in controllers}
-    place = {} if folder is None else {"out": folder.path / "held-out", "allow_mixed": allow_mixed}
-    result = run("held-out", compared, tuned, episodes=held_out, seed=seed + 1, **place)
-    if folder is not None:
-        folder.finish(best, result.complete)
-    return Tuning(_frame(rows), metric, best, result, None if folder is None else folder.path, result.complete)
+        return run_plan(plan, None if folder is None else folder / "held-out", self._news("held-out"))
+
+    def _news(self, what: str) -> Callable[[Update], None] | None:
+        return self._on_progress and functools.partial(self._on_progress, what)
 
 
 def _behind(controllers: Sequence[str], env_id: str) -> dict[str, str]:
@@ -180,42 +217,6 @@ def _behind(controllers: Sequence[str], env_id: str) -> dict[str, str]:
     for name in controllers:
         found |= behind(name, env_id, known[name], policy_for(known[name], env, {}))
     return found
-
-
-class _Proposer:
-    """Optuna as a function from finished trials to the next gains.
-
-    Raises:
-        OptionError: if it is not installed.
-    """
-
-    def __init__(self, seed: int) -> None:
-        try:
-            import optuna
-        except ImportError as error:
-            raise OptionError("optuna", "not installed", "pip install 'artde-gym[tune]'") from error
-        self._optuna = optuna
-        self._seed = seed
-        optuna.logging.set_verbosity(optuna.logging.WARNING)  # not one line a trial
-
-    def propose(
-        self, name: str, space: Mapping[str, GainRange], history: list[tuple[Gains, float]], number: int
-    ) -> Gains:
-        """Gains of trial `number`, to four digits."""
-        if number == 0:
-            return {gain: where.start for gain, where in space.items()}
-        optuna = self._optuna
-        ranges: dict[str, Any] = {
-            gain: optuna.distributions.FloatDistribution(where.low, where.high, log=True)
-            for gain, where in space.items()
-        }
-        own = np.random.SeedSequence([self._seed, zlib.crc32(name.encode()), number])
-        study = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=int(own.generate_state(1)[0])))
-        study.add_trials(
-            [optuna.trial.create_trial(params=params, distributions=ranges, value=cost) for params, cost in history]
-        )
-        found = study.ask(ranges).params
-        return {gain: min(max(float(f"{found[gain]:.4g}"), where.low), where.high) for gain, where in space.items()}
 
 
 def _history(rows: list[dict[str, Any]], name: str) -> list[tuple[Gains, float]]:
@@ -239,63 +240,3 @@ def _row(result: Result, name: str, number: int, metric: str, gains: Gains) -> d
     mean = float(error[~fell].mean()) if not fell.all() else float("nan")
     values = (name, number, float(cost.mean()), mean, int(fell.sum()), json.dumps(gains))
     return dict(zip(TRIAL_COLUMNS, values, strict=True))
-
-
-def _frame(rows: list[dict[str, Any]]) -> pd.DataFrame:
-    return pd.DataFrame(rows, columns=TRIAL_COLUMNS)
-
-
-def _parsed(row: Mapping[str, str]) -> dict[str, Any]:
-    """A row of trials.csv, to the last bit."""
-    numbers = {"trial": int(row["trial"]), "cost": float(row["cost"]), "falls": int(row["falls"])}
-    return {**row, **numbers, "error": float(row["error"] or "nan")}
-
-
-class _Folder:
-    """The folder of one tuning; it is made with the first finished trial, so that a bad argument leaves none behind."""
-
-    def __init__(
-        self, path: Path, configuration: Mapping[str, Any], behind_them: Mapping[str, str], allow_mixed: bool
-    ) -> None:
-        self.path = path
-        self._configuration = plain_configuration(configuration)
-        self._provenance = provenance(behind_them)
-        self.rows: list[dict[str, Any]] = []
-        if path.exists() and not is_empty(path):
-            before = claim(path, RECORD, self._configuration)
-            trials = path / "trials.csv"
-            if trials.exists():
-                with reading("trials.csv", trials, "a table that `tune` wrote", StoreError):
-                    with trials.open(encoding="utf-8", newline="") as file:
-                        self.rows = [_parsed(row) for row in csv.DictReader(file, strict=True)]
-                    for row in self.rows:
-                        if (
-                            json.loads(row["gains"]).keys()
-                            != self._configuration["controllers"][row["controller"]].keys()
-                        ):
-                            raise ValueError(f"gains of another law in a row of {row['controller']}")
-            begun = before if self.rows else None
-            self._provenance = continued(path, begun, self._provenance, allow_mixed=allow_mixed)
-            if MIXED in self._provenance:
-                self._write_record({}, complete=False)
-
-    def write(self, rows: list[dict[str, Any]]) -> None:
-        """Keep the finished trials."""
-        if claim(self.path, RECORD, self._configuration) is None:
-            self._write_record({}, complete=False)
-        text = _frame(rows).to_csv(index=False, lineterminator="\n")
-        write_atomically(self.path / "trials.csv", lambda file: file.write(text.encode()))
-
-    def finish(self, best: Mapping[str, Gains], complete: bool) -> None:
-        """Keep the best gains."""
-        self._write_record(best, complete)
-
-    def _write_record(self, best: Mapping[str, Gains], complete: bool) -> None:
-        record = {
-            "configuration": self._configuration,
-            "provenance": self._provenance,
-            "complete": complete,
-            "best": best,
-        }
-        text = json.dumps(record, indent=2) + "\n"
-        write_atomically(self.path / RECORD, lambda file: file.write(text.encode()))

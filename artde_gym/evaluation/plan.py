@@ -1,0 +1,160 @@
+"""The plan of a study: all that decides about its episodes, checked once.
+
+`Plan.of` takes what a user gives to `evaluate` and its kind, and refuses what is wrong with it; what a study derives
+from a plan with `dataclasses.replace` is not checked again, but for what only an environment can tell (`try_out`).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import itertools
+import math
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import Any, get_args
+
+from artde_gym.arguments import number, whole
+from artde_gym.errors import OptionError, among
+from artde_gym.evaluation.cells import Cell, cells_of, tried
+from artde_gym.evaluation.environments import Backend
+from artde_gym.evaluation.gains import checked_gains, policy_for
+from artde_gym.evaluation.identity import Identity, behind, identity_of
+from artde_gym.evaluation.labels import named_controllers
+from artde_gym.evaluation.provenance import provenance
+from artde_gym.evaluation.rollout import Policy
+from artde_gym.evaluation.tasks import Case, Task, tasks_of
+from artde_gym.evaluation.workers import check_picklable, check_workers
+from artde_gym.registration import ControllerSpec
+
+MOST_EPISODES = 1_000_000
+SLOWEST = 1e-3  # Hz, of stored signals
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """Controllers on the same seeded episodes of some cells.
+
+    Attributes:
+        controllers: by the name under which each is listed.
+        cells: environments with their arguments and disturbances.
+        gains: controller -> gains in place of its preset's.
+        episodes: of each controller in each cell.
+        seed: from which those of the episodes are derived.
+        workers: processes.
+        backend: as for `evaluate`.
+        traced: how many episodes of each controller and cell leave signals; None for what the backend is used to.
+        trace_hz: rate of stored signals; infinite for all of them.
+        allow_mixed: whether results of other software may be continued.
+    """
+
+    controllers: Mapping[str, Policy | ControllerSpec]
+    cells: tuple[Cell, ...]
+    gains: Mapping[str, dict[str, Any]]
+    episodes: int
+    seed: int
+    workers: int
+    backend: Backend
+    traced: int | None
+    trace_hz: float
+    allow_mixed: bool
+
+    @classmethod
+    def of(
+        cls,
+        controllers: Sequence[str | Policy] | Mapping[str, str | Policy],
+        env_id: str | None = None,
+        *,
+        scenario: str | Sequence[str] | None = None,
+        episodes: int = 1,
+        seed: int = 0,
+        workers: int = 1,
+        disturbances: Mapping[str, Any] | None = None,
+        env_kwargs: Mapping[str, Any] | None = None,
+        gains: Mapping[str, Mapping[str, Any]] | None = None,
+        backend: Backend = "single",
+        traced: int | None = None,
+        trace_hz: float = 100.0,
+        allow_mixed: bool = False,
+    ) -> Plan:
+        """Make a plan from what `evaluate` takes; see there for the arguments.
+
+        Raises:
+            UnknownNameError, OptionError: for a bad argument.
+        """
+        check_workers(workers)
+        whole("episodes", episodes, 1, MOST_EPISODES)
+        whole("seed", seed, 0)
+        number("trace_hz", trace_hz, SLOWEST, math.inf, f"a number >= {SLOWEST:g} (Hz), infinite for every sample")
+        if backend not in get_args(Backend):
+            raise OptionError("backend", backend, among(backend, get_args(Backend)))
+        if traced is not None:
+            whole("traced", traced, 0)
+        named = named_controllers(controllers)
+        own_gains = checked_gains(gains, named)
+        cells = tuple(cells_of(env_id, scenario, env_kwargs, disturbances, backend))
+        if workers > 1:
+            check_picklable(named, own_gains)
+        return cls(named, cells, own_gains, episodes, seed, workers, backend, traced, trace_hz, allow_mixed)
+
+    @property
+    def total(self) -> int:
+        """Number of all episodes."""
+        return self.episodes * len(self.cells) * len(self.controllers)
+
+    @property
+    def traces(self) -> int:
+        """Number of episodes of each controller and cell that leave signals."""
+        if self.traced is not None:
+            return self.traced
+        return self.episodes if self.backend == "single" else 0
+
+    def only(self, names: Collection[str], cell: Cell) -> Plan:
+        """Return the plan for some of the controllers in one cell."""
+        controllers = {name: item for name, item in self.controllers.items() if name in names}
+        gains = {name: values for name, values in self.gains.items() if name in names}
+        return dataclasses.replace(self, controllers=controllers, gains=gains, cells=(cell,))
+
+    def configuration(self) -> dict[str, Any]:
+        """Return what a results folder is continued by: all that decides about an episode, as plain data."""
+        return {
+            "cells": [{"name": cell.name, "env_id": cell.env_id, "kwargs": cell.kwargs} for cell in self.cells],
+            "controllers": {name: identity.value for name, identity in self._identities.items()},
+            "gains": self.gains,
+            "episodes": self.episodes,
+            "seed": self.seed,
+            "backend": self.backend,
+            "traced": self.traces,
+            "trace_hz": self.trace_hz if math.isfinite(self.trace_hz) else "all",
+        }
+
+    def provenance(self, evidence: Mapping[str, str]) -> dict[str, Any]:
+        """Return what produces the results, with what `try_out` found behind the controllers."""
+        return provenance(evidence, {name: identity.by for name, identity in self._identities.items()})
+
+    @functools.cached_property
+    def _identities(self) -> dict[str, Identity]:
+        return {name: identity_of(item) for name, item in self.controllers.items()}
+
+    def try_out(self) -> dict[str, str]:
+        """Build everything once, so that a bad argument shows before the first episode and not in a worker.
+
+        Returns:
+            Hashes of weights and code behind the controllers.
+
+        Raises:
+            OptionError, DisturbanceError, GainError: for what an environment or a controller refuses.
+        """
+        found: dict[str, str] = {}
+        for cell in self.cells:
+            env = tried(self.backend, cell)
+            for name, item in self.controllers.items():
+                found |= behind(name, cell.env_id, item, policy_for(item, env, self.gains.get(name, {})))
+        return found
+
+    def tasks(self, done: Collection[tuple[str, str, int]]) -> Iterator[Task]:
+        """Return what is left to run: `done` are scenario, controller and number of finished episodes."""
+        cases = [
+            Case(cell, name, item, self.gains.get(name, {}), self.seed)
+            for cell, (name, item) in itertools.product(self.cells, self.controllers.items())
+        ]
+        return tasks_of(cases, self.episodes, self.backend, done, traced=self.traces, trace_hz=self.trace_hz)

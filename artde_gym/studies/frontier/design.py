@@ -1,0 +1,67 @@
+"""The design of a frontier: the test that all levels have in common, and the number that is varied in it."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+from artde_gym.errors import OptionError, among
+from artde_gym.evaluation.cells import Cell, tried
+from artde_gym.evaluation.environments import Backend, arguments_of
+from artde_gym.evaluation.plan import Plan
+from artde_gym.studies.frontier.axis import Axis
+from artde_gym.studies.frontier.standard import standard_test
+
+
+@dataclasses.dataclass(frozen=True)
+class Design:
+    """A test in which one number is varied.
+
+    Attributes:
+        axis: what is varied.
+        survival: share of episodes without a fall that a level takes to count as survived.
+        disturbances: of the test.
+        arguments: of its environment.
+    """
+
+    axis: Axis
+    survival: float
+    disturbances: Mapping[str, Any]
+    arguments: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, plan: Plan, axis: Axis, survival: float) -> Design:
+        """Make a design from a plan with one cell; without disturbances of its own, it is the robot's standard test.
+
+        Raises:
+            OptionError, DisturbanceError: if the test, or an end of the axis, is not allowed.
+        """
+        if not (isinstance(survival, (int, float)) and 0 < survival <= 1):
+            raise OptionError("survival", survival, "above 0 up to 1")
+        (cell,) = plan.cells
+        arguments = dict(cell.kwargs)
+        disturbances = arguments.pop("disturbances", None)
+        _check_arguments(cell.env_id, plan.backend, axis, arguments)
+        if disturbances is None:
+            disturbances, arguments = standard_test(cell.env_id, axis.path, arguments)
+        design = cls(axis, survival, disturbances, arguments)
+        for end in (axis.levels[0], axis.levels[-1]):
+            placed = design.at(end, cell)
+            if axis.kind is None:  # nothing here knows the argument's range: let the environment refuse it at once
+                tried(plan.backend, placed)
+        return design
+
+    def at(self, value: float, cell: Cell) -> Cell:
+        """Return a cell with this test at one level."""
+        disturbances, arguments = self.axis.place(value, self.disturbances, self.arguments)
+        return cell._replace(kwargs={**arguments, "disturbances": disturbances})
+
+
+def _check_arguments(env_id: str, backend: Backend, axis: Axis, given: Mapping[str, Any]) -> None:
+    known = arguments_of(env_id, backend)
+    for name in given:
+        if name not in known:
+            raise OptionError(f"argument of {env_id}", name, among(name, known))
+        if axis.kind is None and name == axis.name:
+            raise OptionError("env_kwargs", name, "arguments that are not varied")
