@@ -20,10 +20,13 @@ from artde_gym.registry import Registry
 from artde_gym.scenarios import Scenario
 
 Capability = Literal[
-    "actuators", "armature", "contact", "encoders", "feet", "flight", "joints", "legs", "mass", "payload", "rotors",
-    "sensors", "sites", "torque_limit",
+    "actuators", "armature", "contact", "effects", "encoders", "feet", "flight", "joints", "legs", "mass", "payload",
+    "rotors", "sensors", "sites", "torque_limit",
 ]  # fmt: skip
-"""Properties of a robot, and of its environments, that kinds of disturbances ask for."""
+"""Properties of a robot, and of its environments, that kinds of disturbances ask for.
+
+"effects" are those of registered kinds: the environments apply `artde_gym.disturbances.effects.Effects`.
+"""
 Harder = Literal["larger", "smaller"]
 
 

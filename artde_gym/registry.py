@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import entry_points
+from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from artde_gym.errors import OptionError, UnknownNameError, among
@@ -18,12 +19,19 @@ class Registry(Mapping[str, T], Generic[T]):
         noun: of an entry, for errors.
         group: of the entry points (of any installed distribution) that bring entries.
         unpack: turns one loaded entry point into entries by name; without, it is one entry, under its own name.
+        own: entries that are there from the beginning.
     """
 
-    def __init__(self, noun: str, group: str, unpack: Callable[[Any], Mapping[str, T]] | None = None) -> None:
+    def __init__(
+        self,
+        noun: str,
+        group: str,
+        unpack: Callable[[Any], Mapping[str, T]] | None = None,
+        own: Mapping[str, T] = MappingProxyType({}),
+    ) -> None:
         self.noun, self.group = noun, group
         self._unpack = unpack
-        self._entries: dict[str, T] = {}
+        self._entries: dict[str, T] = dict(own)
         self._loaded = False
 
     def register(self, name: str, entry: T, *, replace: bool = False) -> None:

@@ -23,16 +23,18 @@ def numeric(sampled: Mapping[str, Any], words: Words) -> dict[str, Any]:
     """Name each number, words being replaced by numbers and lists of entries by arrays."""
     told: dict[str, Any] = {}
     for kind, value in sampled.items():
-        for parameter in KINDS[kind].parameters:
+        given = value[0] if KINDS[kind].repeated else value
+        for parameter in (one for one in KINDS[kind].parameters if one.name in given):
             told[f"disturbance.{kind}.{parameter.name}"] = (
-                np.array([_number(parameter, entry[parameter.name], words) for entry in value])
+                np.array([number_of(parameter, entry[parameter.name], words) for entry in value])
                 if KINDS[kind].repeated
-                else _number(parameter, value[parameter.name], words)
+                else number_of(parameter, value[parameter.name], words)
             )
     return told
 
 
-def _number(parameter: Parameter, value: Any, words: Words) -> Any:
+def number_of(parameter: Parameter, value: Any, words: Words) -> Any:
+    """Return a sampled value as a number or an array; a word is its place among those allowed."""
     if parameter.size == 0:
         known = words[parameter.words] if isinstance(parameter.words, str) else parameter.words
         return list(known).index(value)

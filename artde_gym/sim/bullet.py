@@ -242,6 +242,11 @@ class BulletEngine:
         link = self._links[self._site(site)[0]]
         bullet.applyExternalForce(self._robot, link, force, point, bullet.WORLD_FRAME, physicsClientId=self._client)
 
+    def load_base(self, force: Vector, torque: Vector) -> None:
+        quat = bullet.getBasePositionAndOrientation(self._robot, physicsClientId=self._client)[1]
+        back = (-quat[0], -quat[1], -quat[2], quat[3])
+        self.push_base(rotated(force, back), rotated(torque, back))
+
     def lift_feet(self, forces: Sequence[float]) -> None:
         client = self._client
         for foot, force in zip(self._feet, forces, strict=True):

@@ -45,6 +45,13 @@ class World(Protocol):
         """
         ...
 
+    def load_base(self, force: Vector, torque: Vector) -> None:
+        """Add a force (N) at the base link's own center of mass and a torque (Nm), world axes, for the next step only.
+
+        A payload does not move their point of action.
+        """
+        ...
+
     def lift_feet(self, forces: Sequence[float]) -> None:
         """Add upward forces (N) at the centers of mass of the feet, one a foot, for the next step only."""
         ...

@@ -114,6 +114,7 @@ KIT = RobotKit(
             "actuators",
             "armature",
             "contact",
+            "effects",
             "encoders",
             "feet",
             "joints",
