@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import functools
+import operator
+from collections.abc import Callable, Iterable
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -18,3 +20,8 @@ def each(function: Callable[..., float]) -> Callable[..., Array]:
         return np.fromiter(map(function, *(array.tolist() for array in arrays)), np.float64, len(arrays[0]))
 
     return mapped
+
+
+def total(values: Iterable[float]) -> float:
+    """Add numbers from left to right, as a batch does: since Python 3.12, `sum` corrects the last bit."""
+    return functools.reduce(operator.add, values, 0.0)

@@ -41,6 +41,13 @@ class UnknownArgumentError(OptionError, TypeError):
         return f"{self.field} got an unexpected keyword argument {self.value!r}; allowed: {self.allowed}"
 
 
+class MissingDependencyError(OptionError):
+    """An argument that needs a package which this Python does not have; `allowed` says what to do."""
+
+    def __str__(self) -> str:
+        return f"{self.field} {self.value!r} is not available: {self.allowed}"
+
+
 class ActionError(ArtdeGymError):
     """An action of the wrong shape, or with a value that is not finite."""
 

@@ -39,7 +39,7 @@ HELP = (
 
 
 class Viewer(Protocol):
-    """What a session needs of a window; see `artde_gym.sim.window.Window`."""
+    """What a session needs of a window; see `artde_gym.sim.window`."""
 
     @property
     def open(self) -> bool: ...

@@ -20,7 +20,7 @@ import artde_gym
 from artde_gym.arguments import number, reading
 from artde_gym.errors import among
 from artde_gym.evaluation import evaluate
-from artde_gym.evaluation.environments import Backend
+from artde_gym.evaluation.environments import Backend, with_engine
 from artde_gym.evaluation.evaluate import cells_of, tried
 from artde_gym.evaluation.store import write_atomically
 from artde_gym.evaluation.workers import check_workers
@@ -120,7 +120,7 @@ class Run:
         self.training, self.folder, self.task = training, folder, task(training.env_id)
         self._on_progress = on_progress or (lambda _: None)
         self.state: dict[str, Any] = {"best": None, "stale": 0, "tests": []}
-        self._configuration = _plain(training)
+        self._configuration = _plain(training) | {"engine": environment_kwargs(training).get("engine")}
         _refuse_others(folder, self._configuration, {"workers"} if self.batched else set())
         (cell,) = cells_of(training.env_id, None, environment_kwargs(training), self.task.test)
         tried(self.backend, cell)
@@ -222,7 +222,9 @@ _SHOWN = ("fell", "duration_s", "rmse_m", "reward")
 
 def environment_kwargs(training: Training) -> dict[str, Any]:
     """Arguments of the training's environments."""
-    return {**task(training.env_id).kwargs, **training.env_kwargs}
+    known = task(training.env_id)
+    given = {**known.kwargs, **training.env_kwargs}
+    return given if known.batch_engine is None else with_engine(training.env_id, given)  # else a batch is an engine
 
 
 def single(env_id: str, kwargs: dict[str, Any], recipe: Recipe) -> ResidualEnv:

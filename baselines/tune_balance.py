@@ -43,7 +43,7 @@ def tune(training: Training, out: str | Path, on_progress: Callable[[Progress], 
         raise TrainingError("recipe", training.recipe, "the biped's synergies, of which the law has gains")
     run = Run(training, Path(out), on_progress)
     if not run.batched:
-        raise TrainingError("engine", training.env_kwargs.get("engine"), repr(run.task.batch_engine))
+        raise TrainingError("engine", environment_kwargs(training).get("engine"), repr(run.task.batch_engine))
     kwargs = {**environment_kwargs(training), "duration": DURATION, "disturbances": _PUSH}
     env = batched(training.env_id, training.recipe, POPULATION * PUSHES, kwargs)
     residual = env.residual

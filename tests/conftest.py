@@ -17,6 +17,8 @@ import pytest
 import websocket
 from hypothesis import settings
 
+pytest_plugins = ("selection",)
+
 settings.register_profile("reproducible", deadline=None, derandomize=True)
 settings.load_profile("reproducible")
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
 from typing import Any
 
 import gymnasium as gym
 
-ENGINES = {"bullet": "PyBullet", **({"mujoco": "MuJoCo"} if importlib.util.find_spec("mujoco") else {})}
+from artde_gym.sim.factory import installed_engines
+
+ENGINES: dict[str, str] = {**installed_engines()}
 """Engines that are installed, and how they are written."""
 
 

@@ -20,8 +20,6 @@ STEPS = 3000  # two seconds of standing, a step
 def herds(quick: bool) -> Section:
     """Times of a control period in closed loop: of one robot in each engine, and of many in MuJoCo."""
     title = "Many bipeds at once"
-    if "mujoco" not in ENGINES:
-        return Section(title, "", skipped="MuJoCo is not installed: pip install 'artde-gym[mujoco]'")
     rounds = STEPS // TURN // (10 if quick else 1)
     figures = []
     for law in LAWS:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import platform
 from typing import Any
 
 import numpy as np
 
 from artde_gym.benchmark.environments import ENGINES, biped, fleet
 from artde_gym.benchmark.figure import Figure, Section
-from artde_gym.benchmark.timing import resident
+from artde_gym.benchmark.timing import MEMORY, resident
 
 MOST = 5.0  # MB
 STEPS, RESETS = 20_000, 200
@@ -16,6 +17,8 @@ STEPS, RESETS = 20_000, 200
 
 def growing(quick: bool) -> Section:
     """Growth of the resident memory over resets and steps, after a warm-up."""
+    if not MEMORY.exists():
+        return Section("Memory", "", skipped=f"{platform.system()} does not tell a process its memory in /proc")
     share = 10 if quick else 1
     figures = []
     for engine, written in ENGINES.items():

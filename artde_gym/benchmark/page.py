@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import platform
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -48,7 +49,7 @@ def page(found: Mapping[str, Section]) -> str:
 
 def machine() -> dict[str, Any]:
     """Processor and number of cores."""
-    processor = "an unknown processor"
+    processor = platform.processor() or platform.machine() or "an unknown processor"
     try:
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
             if line.startswith("model name"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 import statistics
 import time
 from collections.abc import Callable, Hashable, Mapping
@@ -11,6 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from artde_gym.errors import OptionError
 from artde_gym.registration import make_controller
 
 TURN = 50
@@ -88,7 +90,17 @@ class Replay:
         self.env.step(action)
 
 
+MEMORY = Path("/proc/self/statm")
+"""Where Linux tells the memory of a process; other systems do not have it."""
+
+
 def resident() -> int:
-    """Resident memory of this process (bytes)."""
-    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    """Return the resident memory of this process (bytes).
+
+    Raises:
+        OptionError: on systems other than Linux.
+    """
+    if not MEMORY.exists():
+        raise OptionError("operating system", platform.system(), "Linux, which tells a process its memory in /proc")
+    pages = int(MEMORY.read_text(encoding="ascii").split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE")

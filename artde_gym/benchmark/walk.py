@@ -50,5 +50,5 @@ def walking(quick: bool) -> Section:
         f"A walk of {STEPS} steps at a control period of 1 ms (a physics step each) with a payload and geared rotors, "
         "on one core. The environment alone and the bare engine repeat the torques of ARTDE's closed loop."
     )
-    skipped = "" if len(ENGINES) > 1 else "MuJoCo is not installed: pip install 'artde-gym[mujoco]'"
+    skipped = "" if len(ENGINES) > 1 else "its part in PyBullet, which is not installed: see `artde-gym doctor`"
     return Section("The biped", text, tuple(figures), skipped)

@@ -13,9 +13,9 @@ from typing import Annotated, Any
 import typer
 
 from artde_gym.errors import OptionError
+from artde_gym.sim.factory import ENGINES
 
 WALK = "BipedWalk-Payload-v0"
-ENGINES = ("bullet", "mujoco")
 
 Controllers = Annotated[str, typer.Option(help="Names, comma-separated; see `list`.")]
 Seed = Annotated[int, typer.Option(help="Seed of everything.")]
@@ -24,7 +24,7 @@ Out = Annotated[Path | None, typer.Option(help="Results folder. Default: runs/<d
 Backend = Annotated[
     str, typer.Option(help="single: one environment after the other; batch: many at once (of the biped, in MuJoCo).")
 ]
-Engine = Annotated[str | None, typer.Option(help=f"Physics engine: {' or '.join(ENGINES)}.")]
+Engine = Annotated[str | None, typer.Option(help=f"Physics engine: {' or '.join(ENGINES)}. Default: see `doctor`.")]
 Disturbances = Annotated[str | None, typer.Option(help="JSON, in place of those that belong to what is run.")]
 EnvKwargs = Annotated[str | None, typer.Option(help="JSON, arguments of the environment.")]
 Gains = Annotated[str | None, typer.Option(help='JSON, e.g. {"artde": {"gamma_0": 200}}.')]

@@ -10,13 +10,13 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from artde_gym.cli.arguments import ENGINES
 from artde_gym.disturbances import KINDS
 from artde_gym.disturbances.kinds import ALL, allowed, other_defaults
 from artde_gym.evaluation.environments import arguments_of, ours, robot_of
 from artde_gym.kit import ROBOTS
 from artde_gym.registration import registered_controllers
 from artde_gym.scenarios import SCENARIOS
+from artde_gym.sim.factory import ENGINES
 from controllers.presets import LOOPS, PRESETS, named_gains
 from controllers.presets.units import unit_of
 

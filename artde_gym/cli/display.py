@@ -5,7 +5,9 @@ from __future__ import annotations
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from artde_gym.evaluation.evaluate import Update
+from artde_gym.evaluation.environments import physics_of
+from artde_gym.evaluation.evaluate import Task, Update
+from artde_gym.evaluation.provenance import versions
 
 
 def terminal() -> Console:
@@ -43,6 +45,8 @@ class Display:
             self._progress.stop()
 
     def __call__(self, update: Update, what: str = "episodes") -> None:
+        if not self._progress.live.is_started:
+            self._progress.console.print(f"Engine: {engine_of(update.task)}")
         self._progress.start()  # with the first news; an error before it leaves no empty bar
         if what != self._what:
             self._what = what
@@ -58,3 +62,9 @@ class Display:
             for (name, controller, numbers), time in self._running.items()
         )
         self._progress.update(self._bar, completed=update.finished, total=update.total, description=text, what=what)
+
+
+def engine_of(task: Task) -> str:
+    """Say in which physics a task runs, and its version."""
+    written = physics_of(task.cell.kwargs)
+    return " ".join([written, *versions([written.lower()]).values()])

@@ -32,16 +32,16 @@ def play(
     env_kwargs: EnvKwargs = None,
     gains: Gains = None,
 ) -> None:
-    """Watch a controller live in a window of Bullet's, push the robot and drop its payload by key or mouse."""
+    """Watch a controller live in a window, push the robot and drop its payload by key or mouse."""
     from artde_gym.evaluation.environments import single  # only when asked for
     from artde_gym.evaluation.evaluate import cells_of
     from artde_gym.play import HELP, Session
-    from artde_gym.sim.window import Window
+    from artde_gym.sim.window import open_window
 
     whole("seed", seed, 0)
     kwargs, overrides = environment_kwargs(env_kwargs, engine), json_object("--gains", gains)
     (cell,) = cells_of(env, scenario, kwargs, optional_json("--disturbances", disturbances))
-    window = Window()
+    window = open_window()
     try:
         plant = single(cell.env_id, json.dumps(cell.kwargs))
         policy = make_controller(controller, plant, **overrides)

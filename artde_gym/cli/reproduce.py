@@ -8,11 +8,12 @@ from typing import Annotated
 import pandas as pd
 import typer
 
-from artde_gym.cli.arguments import ENGINES, AllowMixed, Pictures, Report, Seed, Videos, Workers, names, processes
+from artde_gym.cli.arguments import AllowMixed, Pictures, Report, Seed, Videos, Workers, names, processes
 from artde_gym.cli.display import Display, terminal
 from artde_gym.cli.report import show_report
 from artde_gym.errors import OptionError
 from artde_gym.evaluation.console import print_claims, print_result
+from artde_gym.sim.factory import ENGINES, resolve_engine
 from artde_gym.studies import reproduce as run_reproduction
 from artde_gym.studies.reproduce.claims import confirm
 from artde_gym.studies.reproduce.reproduction import scenarios_of, titles
@@ -20,7 +21,9 @@ from artde_gym.studies.reproduce.reproduction import scenarios_of, titles
 
 def reproduce(
     robot: Annotated[str, typer.Option(help=f"{', '.join(titles())}, or all.")] = "all",
-    engine: Annotated[str, typer.Option(help=f"Physics engine: {', '.join(ENGINES)}, or both.")] = "bullet",
+    engine: Annotated[
+        str | None, typer.Option(help=f"Physics engine: {', '.join(ENGINES)}, or both. Default: see `doctor`.")
+    ] = None,
     episodes: Annotated[int, typer.Option(help="Seeded episodes of each controller in each scenario.")] = 10,
     scenario: Annotated[str | None, typer.Option(help="Names, comma-separated. Default: all of the robot.")] = None,
     controllers: Annotated[str | None, typer.Option(help="Names, comma-separated. Default: the robot's own.")] = None,
@@ -39,7 +42,7 @@ def reproduce(
 ) -> None:
     """Run the thesis' scenarios and print its tables beside ours, then each of its claims with a verdict."""
     robots = titles() if robot == "all" else [robot]
-    engines = list(ENGINES) if engine == "both" else [engine]
+    engines = list(ENGINES) if engine == "both" else [resolve_engine(engine)]
     named = None if scenario is None else names(scenario)
     shares = {name: chosen for name in robots if (chosen := scenarios_of(name, named))}
     for one in named or ():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import multiprocessing
 from typing import Any
 
@@ -12,6 +11,7 @@ import gymnasium as gym
 import artde_gym  # noqa: F401  # registers the environments
 from artde_gym.doctor.outcome import Outcome
 from artde_gym.registration import make_controller
+from artde_gym.sim.factory import installed_engines
 
 STEPS = 150
 WALK, FLIGHT = "BipedWalk-Payload-v0", "QuadInfinity-Payload-v0"
@@ -37,8 +37,10 @@ def determinism() -> list[Outcome]:
 
 def runs() -> list[str]:
     """What is run."""
-    engines = ["bullet", *(["mujoco"] if importlib.util.find_spec("mujoco") else [])]
-    return [*(f"{robot} in {engine}" for engine in engines for robot in ("biped", "quadrotor")), "quadrotors in batch"]
+    return [
+        *(f"{robot} in {engine}" for engine in installed_engines() for robot in ("biped", "quadrotor")),
+        "quadrotors in batch",
+    ]
 
 
 def digest(name: str) -> str:

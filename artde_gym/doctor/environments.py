@@ -15,8 +15,8 @@ from gymnasium.utils.env_checker import check_env
 
 import artde_gym  # noqa: F401  # registers the environments
 from artde_gym.doctor.outcome import Outcome
-from artde_gym.errors import OptionError
 from artde_gym.evaluation.environments import ours, vector
+from artde_gym.sim.factory import missing_bullet, resolve_engine
 
 ARGUMENTS: dict[str, Any] = {"duration": 3.0, "disturbances": {"payload": 0.3}}
 IN_SI_UNITS = r".*(symmetric and normalized|recommend using np.float32)"
@@ -25,14 +25,14 @@ REMEDY = "pip install -c constraints.txt --force-reinstall . : the tests pass wi
 
 
 def bullet() -> list[Outcome]:
-    """Gymnasium's checker on every environment, in the default engine."""
+    """Run Gymnasium's checker on every environment in PyBullet, where it is there."""
+    if missing := missing_bullet():
+        return [Outcome("PyBullet", "missing", "the default engine is MuJoCo", missing)]
     return [_checked(name, "bullet", _gymnasium) for name in ours()]
 
 
 def mujoco() -> list[Outcome]:
-    """Likewise in the second engine."""
-    if importlib.util.find_spec("mujoco") is None:
-        return [Outcome("MuJoCo", "missing", "not installed", "pip install 'artde-gym[mujoco]'")]
+    """Run Gymnasium's checker on every environment in MuJoCo."""
     return [_checked(name, "mujoco", _gymnasium) for name in ours()]
 
 
@@ -41,7 +41,7 @@ def stable_baselines3() -> list[Outcome]:
     if importlib.util.find_spec("stable_baselines3") is None:
         return [Outcome("Stable-Baselines3", "missing", "not installed", "pip install 'artde-gym[rl]'")]
     checker = importlib.import_module("stable_baselines3.common.env_checker")
-    return [_checked(name, "bullet", checker.check_env) for name in ours()]
+    return [_checked(name, resolve_engine(None), checker.check_env) for name in ours()]
 
 
 def batch() -> list[Outcome]:
@@ -50,12 +50,8 @@ def batch() -> list[Outcome]:
     for name in ours():
         if gym.spec(name).vector_entry_point is None:
             continue
-        try:
-            both: list[Any] = [vector(name, json.dumps(ARGUMENTS), size) for size in (8, 1)]
-        except OptionError as error:  # the biped's are MuJoCo's
-            outcomes.append(Outcome(name, "missing", f"{error.field} {error.value!r} is not there", error.allowed))
-            continue
-        many, one = both
+        vectors: list[Any] = [vector(name, json.dumps(ARGUMENTS), size) for size in (8, 1)]
+        many, one = vectors
         action = many.action_space.low * 0.5 + many.action_space.high * 0.5
         many.reset(seed=[7, *range(1, 8)])
         one.reset(seed=[7])

@@ -14,9 +14,10 @@ from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 
 from artde_gym.doctor.outcome import Outcome, Status
+from artde_gym.sim.factory import missing_bullet
 
 PACKAGE = "artde-gym"
-MODULES = {"pybullet": "pybullet", "numpy": "numpy", "scipy": "scipy", "matplotlib": "matplotlib", "pandas": "pandas"}
+MODULES = {"mujoco": "mujoco", "numpy": "numpy", "scipy": "scipy", "matplotlib": "matplotlib", "pandas": "pandas"}
 """Packages with compiled parts -> what is imported to see that they load."""
 DISK = 1e9  # bytes, of which a results folder seldom needs more
 RUNS = Path("runs")
@@ -36,10 +37,8 @@ def python() -> list[Outcome]:
     system = f"{platform.system()} {platform.machine()}"
     right = SpecifierSet(wanted).contains(version) and platform.python_implementation() == "CPython"
     here = f"{platform.python_implementation()} {version} on {system}"
-    remedy = "make a virtual environment of CPython 3.11: python3.11 -m venv .venv"
+    remedy = f"make a virtual environment of CPython {wanted}, 3.11 for both physics engines: python3.11 -m venv .venv"
     outcomes = [Outcome("Python", "ok", here) if right else Outcome("Python", "failed", here, remedy)]
-    if (platform.system(), platform.machine()) != ("Linux", "x86_64"):
-        outcomes.append(Outcome("platform", "failed", system, "use Linux x86-64, for which PyBullet has wheels"))
     outcomes += [_installed(one, "failed", f"pip install '{one}'") for one in _requirements(None)]
     for name, module in MODULES.items():
         try:
@@ -47,7 +46,14 @@ def python() -> list[Outcome]:
         except Exception as error:
             again = f"pip install --force-reinstall --no-deps {name}"
             outcomes.append(Outcome(f"import {module}", "failed", f"{type(error).__name__}: {error}", again))
-    return outcomes
+    return [*outcomes, _engine()]
+
+
+def _engine() -> Outcome:
+    """The default physics engine, and why it is this one."""
+    if missing := missing_bullet():
+        return Outcome("default engine", "missing", "MuJoCo, since PyBullet cannot be imported", missing)
+    return Outcome("default engine", "ok", "PyBullet, since it can be imported")
 
 
 def extras() -> list[Outcome]:

@@ -8,13 +8,14 @@ import importlib.util
 import os
 import shutil
 import subprocess
+import sys
 from typing import Any
 
 import gymnasium as gym
 
 import artde_gym  # noqa: F401  # registers the environments
 from artde_gym.doctor.outcome import Outcome
-from artde_gym.errors import OptionError
+from artde_gym.errors import MissingDependencyError, OptionError
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
@@ -27,14 +28,14 @@ def pictures() -> list[Outcome]:
 def _picture(engine: str, written: str) -> Outcome:
     """A picture without a display."""
     what = f"pictures in {written}"
-    if engine == "mujoco" and importlib.util.find_spec("mujoco") is None:
-        return Outcome(what, "missing", "MuJoCo is not installed", "pip install 'artde-gym[mujoco]'")
     try:
         env: Any = gym.make("QuadInfinity-Payload-v0", disable_env_checker=True, duration=3.0, engine=engine,
                        render_mode="rgb_array")  # fmt: skip
         env.reset(seed=0)
         picture = env.render()
         env.close()
+    except MissingDependencyError as error:
+        return Outcome(what, "missing", f"no {written}", error.allowed)
     except OptionError as error:
         return Outcome(what, "missing", "no OpenGL without a display", str(error.allowed))
     height, width, _ = picture.shape
@@ -44,6 +45,8 @@ def _picture(engine: str, written: str) -> Outcome:
 def _display() -> Outcome:
     """An X server that answers: a window of Bullet's ends the interpreter where none does."""
     remedy = "nothing but live windows need one: work at a desktop, or with `ssh -X`; pictures and videos need none"
+    if sys.platform != "linux":
+        return Outcome("display", "ok", "the window system's")
     name = os.environ.get("DISPLAY")
     if not name:
         return Outcome("display", "missing", "none", remedy)

@@ -17,7 +17,8 @@ REAL_TIME = 1000  # steps of 1 ms a second
 
 def speed() -> list[Outcome]:
     """Steps a second of the biped, alone and against the bare engine."""
-    outcomes = [Outcome("processors", "ok", f"{os.cpu_count()}, load {os.getloadavg()[0]:.1f}")]
+    load = f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""  # not on Windows
+    outcomes = [Outcome("processors", "ok", f"{os.cpu_count()}{load}")]
     for engine, written in ENGINES.items():
         loop = ClosedLoop("artde", biped(engine=engine))
         variants = {"loop": loop.turn, "alone": Replay(loop, biped(engine=engine)).turn,

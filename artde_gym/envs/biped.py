@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artde_gym.arguments import action_array, known_arguments, seed_number
-from artde_gym.arrays import Array
+from artde_gym.arrays import Array, total
 from artde_gym.disturbances.effects import Effects
 from artde_gym.disturbances.ground import LOADED, GrfPulses
 from artde_gym.disturbances.schedule import Schedule
@@ -29,7 +29,7 @@ from artde_gym.robots.ojas import task
 from artde_gym.robots.ojas.model import ActuatorInertia
 from artde_gym.robots.ojas.walking import WalkingPattern
 from artde_gym.sim.engine import Camera, Engine
-from artde_gym.sim.factory import EngineName, make_engine
+from artde_gym.sim.factory import EngineName, make_engine, resolve_engine
 from artde_gym.sim.rotation import arcsine, roll_pitch
 
 CAMERA_HEIGHT = 0.42  # m, of what it looks at
@@ -38,7 +38,7 @@ LEEWAY = 0.15  # m, that the robot may be off its pattern before the camera goes
 _PAGE = (
     task.DOCUMENTATION
     + """
-| `engine` | "bullet" | "bullet", "mujoco" | physics engine; see docs/engines.md |
+| `engine` | None | "bullet", "mujoco", None | physics engine; None: Bullet where it can be imported, else MuJoCo |
 | `width`, `height` | 640, 480 | 16 to 4096 | pixels of a picture |
 
 With `render_mode="rgb_array"`, `render` draws 30 pictures a simulated second; asked more often, it gives the last one
@@ -70,7 +70,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self_collision: whether the feet stop each other; a walk as planned never lets them touch.
         speed: see `artde_gym.robots.ojas.walking`, also for `step_duration` and `duration`.
         observe_ground_force: whether the observation ends with the ground's force on each foot.
-        engine: physics engine.
+        engine: physics engine; None for the default. `engine_name` says which one it is.
         width, height: of pictures (pixels).
         render_mode: "rgb_array" or None.
 
@@ -100,7 +100,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         step_duration: float = 1.0,
         duration: float = 58.0,
         observe_ground_force: bool = False,
-        engine: EngineName = "bullet",
+        engine: EngineName | None = None,
         width: int = 640,
         height: int = 480,
         render_mode: Literal["rgb_array"] | None = None,
@@ -113,7 +113,10 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         )
         self.nominal_robot, self.control_period = walk.nominal_robot, walk.control_period
         self._disturbances = walk.parse(self.default_disturbances if disturbances is None else disturbances)
-        self._engine: Engine = make_engine(engine, walk.robot, task.TIME_STEP, renders=render_mode is not None)
+        self.engine_name = resolve_engine(engine)
+        self._engine: Engine = make_engine(
+            self.engine_name, walk.robot, task.TIME_STEP, renders=render_mode is not None
+        )
         camera = Camera((0.0, 0.0, CAMERA_HEIGHT), width=width, height=height)
         self.view = View(self._engine, camera, self.control_period, share=1.0, slack=LEEWAY)
         self.metadata = {**self.metadata, **self.view.metadata}
@@ -171,7 +174,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self._k += 1
         observation = self._measure()
         terms = self._reward_terms(previous)
-        reward = self.control_period * sum(map(operator.mul, task.REWARD_SCALES.values(), terms.values()))
+        reward = self.control_period * total(map(operator.mul, task.REWARD_SCALES.values(), terms.values()))
         falls = self._falls()
         fell, truncated = any(falls), self._k >= self._last
         self._over = fell or truncated

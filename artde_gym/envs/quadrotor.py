@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artde_gym.arguments import action_array, known_arguments, seed_number, steps_per_period
-from artde_gym.arrays import Array
+from artde_gym.arrays import Array, total
 from artde_gym.disturbances.effects import Effects, load_base
 from artde_gym.disturbances.ground_effect import thrust_gain
 from artde_gym.disturbances.noise import draw_keys
@@ -32,7 +32,7 @@ from artde_gym.robots.q450 import task
 from artde_gym.robots.q450.infinity import START
 from artde_gym.robots.q450.rotors import Rotors
 from artde_gym.sim.engine import Camera, Engine
-from artde_gym.sim.factory import EngineName, make_engine
+from artde_gym.sim.factory import EngineName, make_engine, resolve_engine
 from artde_gym.sim.rotation import matrix
 
 TIME_STEP = 0.001  # s, of the physics
@@ -56,7 +56,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
     `vectorization_mode="vector_entry_point"` gives thousands of the same in NumPy (`artde_gym.envs.quadrotor_batch`).
 
     {shared}
-    | `engine` | "bullet" | "bullet", "mujoco" | physics engine; see docs/engines.md |
+    | `engine` | None | "bullet", "mujoco", None | physics engine; None: Bullet where it can be imported, else MuJoCo |
     | `width`, `height` | 640, 480 | 16 to 4096 | pixels of a picture |
 
     With `render_mode="rgb_array"`, `render` draws 30 pictures a simulated second; asked more often, it gives the last
@@ -102,7 +102,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         control_period: float = 0.015,
         measurement: Measurement = "ideal",
         duration: float = 70.0,
-        engine: EngineName = "bullet",
+        engine: EngineName | None = None,
         width: int = 640,
         height: int = 480,
         render_mode: Literal["rgb_array"] | None = None,
@@ -122,7 +122,10 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self.observation_space = task.OBSERVATION.box()
         self.action_space = task.ACTION.box()
         self._low, self._high = self.action_space.low, self.action_space.high
-        self._engine: Engine = make_engine(engine, self.nominal_robot, TIME_STEP, renders=render_mode is not None)
+        self.engine_name = resolve_engine(engine)
+        self._engine: Engine = make_engine(
+            self.engine_name, self.nominal_robot, TIME_STEP, renders=render_mode is not None
+        )
         self.view = View(self._engine, CAMERA._replace(width=width, height=height), self.control_period, SHARE, LEEWAY)
         self.metadata = {**self.metadata, **self.view.metadata}
         self._engine.place(START, _NO_JOINTS)
@@ -168,7 +171,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self._k += 1
         observation = self._measure()
         terms = self._reward_terms(before)
-        reward = self.control_period * sum(map(operator.mul, task.REWARD_SCALES.values(), terms.values()))
+        reward = self.control_period * total(map(operator.mul, task.REWARD_SCALES.values(), terms.values()))
         falls = self._falls()
         terminated, truncated = any(falls), self._k >= self._last
         self._over = terminated or truncated

@@ -14,6 +14,7 @@ from gymnasium.vector import AutoresetMode
 
 from artde_gym.errors import OptionError, among
 from artde_gym.kit import ROBOTS
+from artde_gym.sim.factory import ENGINES, resolve_engine
 from artde_gym.tracking import Tracking
 
 Backend = Literal["single", "batch"]
@@ -53,6 +54,24 @@ def robot_of(env_id: str) -> str:
         OptionError: for any other environment.
     """
     return _class(env_id).robot_name
+
+
+def with_engine(env_id: str, kwargs: Mapping[str, Any], backend: Backend = "single") -> dict[str, Any]:
+    """Return arguments of an environment with the engine that it will run in, so that records say which one it was.
+
+    Raises:
+        OptionError: for an unknown engine.
+    """
+    known = arguments_of(env_id, backend).get("engine")
+    if known is None:
+        return dict(kwargs)
+    given = kwargs.get("engine", known.default)
+    return {**kwargs, "engine": resolve_engine(given) if backend == "single" else given}
+
+
+def physics_of(kwargs: Mapping[str, Any]) -> str:
+    """Say in which physics an environment with arguments of `with_engine` runs."""
+    return ENGINES.get(kwargs["engine"], str(kwargs["engine"])) if "engine" in kwargs else "NumPy"
 
 
 def ours() -> list[str]:

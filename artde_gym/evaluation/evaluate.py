@@ -18,7 +18,7 @@ from artde_gym.arguments import number, whole
 from artde_gym.errors import OptionError, UnknownNameError, among
 from artde_gym.evaluation import canonical
 from artde_gym.evaluation.batch import run_batch
-from artde_gym.evaluation.environments import Backend, single, tracking_of, vector
+from artde_gym.evaluation.environments import Backend, single, tracking_of, vector, with_engine
 from artde_gym.evaluation.identity import behind, identity_of
 from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.metrics import Span
@@ -136,7 +136,7 @@ def evaluate(
     whole("traced", traced, 0)
     named = named_controllers(controllers)
     gains = checked_gains(gains, named)
-    cells = cells_of(env_id, scenario, dict(env_kwargs or {}), disturbances)
+    cells = cells_of(env_id, scenario, dict(env_kwargs or {}), disturbances, backend)
     evidence = _try_out(backend, cells, named, gains)
     if workers > 1:
         check_picklable(named, gains)
@@ -270,8 +270,11 @@ def cells_of(
     names: str | Sequence[str] | None,
     kwargs: dict[str, Any],
     disturbances: Mapping[str, Any] | None,
+    backend: Backend = "single",
 ) -> list[Cell]:
     """What to run of an environment: named scenarios, or it as it is; arguments as of `evaluate`.
+
+    Each one names the engine it runs in, so that a folder begun in one engine does not go on in another.
 
     Raises:
         UnknownNameError, OptionError: for an unknown scenario, or one of another environment.
@@ -282,7 +285,8 @@ def cells_of(
         )
     if names is None:
         own = {} if disturbances is None else {"disturbances": dict(disturbances)}
-        return [Cell(CUSTOM, env_id or DEFAULT_ENVIRONMENT, {**kwargs, **own})]
+        env_id = env_id or DEFAULT_ENVIRONMENT
+        return [Cell(CUSTOM, env_id, {**with_engine(env_id, kwargs, backend), **own})]
     entries: list[Scenario] = [find_scenario(name) for name in ([names] if isinstance(names, str) else names)]
     if not entries:
         raise OptionError("scenario", names, "at least one name, or None")
@@ -294,7 +298,8 @@ def cells_of(
     cells = []
     for entry in entries:
         chosen = dict(entry.disturbances if disturbances is None else disturbances)
-        cells.append(Cell(entry.name, entry.env_id, {**entry.kwargs, **kwargs, "disturbances": chosen}, entry.phases))
+        arguments = with_engine(entry.env_id, {**entry.kwargs, **kwargs}, backend)
+        cells.append(Cell(entry.name, entry.env_id, {**arguments, "disturbances": chosen}, entry.phases))
     return cells
 
 

@@ -8,21 +8,23 @@ from __future__ import annotations
 
 import contextlib
 import datetime
-import fcntl
 import functools
 import inspect
 import json
 import os
 import platform
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
+from filelock import FileLock, Timeout
+
 from artde_gym.errors import StoreError
 from artde_gym.evaluation.provenance import command
 
-LOCK = ".lock"
+LOCK, HOLDER = ".lock", ".lock.json"
 
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")
@@ -55,80 +57,61 @@ def locked(folder: Path) -> Iterator[None]:
     if key in _held:
         yield
         return
-    made, handle = _acquire(folder)
+    made, lock = _acquire(folder)
     _held.add(key)
     try:
         yield
     finally:
         _held.discard(key)
         with contextlib.suppress(OSError):  # somebody has removed the folder
-            (folder / LOCK).unlink()
-            for empty in reversed(made):
-                empty.rmdir()
-        os.close(handle)
+            (folder / HOLDER).unlink()
+            if sys.platform != "win32":  # before the release: whoever waits for it then begins with a new file
+                (folder / LOCK).unlink()
+                for empty in reversed(made):
+                    empty.rmdir()
+        lock.release()
 
 
 def is_empty(folder: Path) -> bool:
     """Return whether a folder holds nothing but its lock."""
-    return all(path.name == LOCK for path in folder.iterdir())
+    return all(path.name in (LOCK, HOLDER) for path in folder.iterdir())
 
 
-def _acquire(folder: Path) -> tuple[list[Path], int]:
-    """The folders that were made for it, and the locked file."""
-    made: list[Path] = []
+def _acquire(folder: Path) -> tuple[list[Path], FileLock]:
+    """Return the folders that were made for it, and the lock that is held."""
     try:
-        while True:
-            made += _make(folder)
-            handle = _try_to_lock(folder)
-            if handle is not None:
-                return made, handle
+        made = _make(folder)
+        lock = FileLock(folder / LOCK, blocking=False, thread_local=False, is_singleton=False)
+        lock.acquire()
+        _sign(folder)
+    except Timeout:
+        allowed = f"a folder that nobody else writes; {_holder(folder)} does"
+        raise StoreError("output folder", str(folder), allowed) from None
     except (FileExistsError, NotADirectoryError):
         raise StoreError("output folder", str(folder), "a new or empty folder; this one holds something else") from None
     except OSError as error:
         raise StoreError("output folder", str(folder), f"a folder that can be written ({error})") from error
+    return made, lock
 
 
 def _make(folder: Path) -> list[Path]:
-    """Make a folder and all above it; those that were not there yet, the uppermost first."""
+    """Make a folder and all above it; return those that were not there yet, the uppermost first."""
     missing = [path for path in reversed([folder, *folder.parents]) if not path.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     return missing
 
 
-def _try_to_lock(folder: Path) -> int | None:
-    """The locked file; None if another process has just removed it, or the folder, and it is to be tried again."""
-    path = folder / LOCK
-    try:
-        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
-    except FileNotFoundError:
-        return None
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        if os.path.samestat(os.fstat(handle), os.stat(path)):
-            _sign(handle)
-            return handle
-    except BlockingIOError:
-        holder = _holder(handle)
-        os.close(handle)
-        raise StoreError("output folder", str(folder), f"a folder that nobody else writes; {holder} does") from None
-    except FileNotFoundError:
-        pass
-    os.close(handle)
-    return None
-
-
-def _sign(handle: int) -> None:
-    """Say in the file who holds it."""
+def _sign(folder: Path) -> None:
+    """Say beside the lock who holds it."""
     now = datetime.datetime.now().astimezone().isoformat(sep=" ", timespec="seconds")
     holder = {"pid": os.getpid(), "host": platform.node(), "since": now, "command": command()}
     with contextlib.suppress(OSError):  # a full disk shows where results are written
-        os.ftruncate(handle, 0)
-        os.pwrite(handle, json.dumps(holder).encode(), 0)
+        (folder / HOLDER).write_text(json.dumps(holder))
 
 
-def _holder(handle: int) -> str:
+def _holder(folder: Path) -> str:
     try:
-        found = json.loads(os.pread(handle, 1 << 16, 0))
+        found = json.loads((folder / HOLDER).read_text())
         return f"process {found['pid']} on {found['host']} ({found['command']!r}, since {found['since']})"
-    except (ValueError, KeyError, TypeError, RecursionError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return "another process"

@@ -40,7 +40,7 @@ def provenance(
         identified_by: controller -> by what its identity was found.
     """
     return {
-        "time": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
+        "time": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "command": command(),
         "commit": _commit(),
         "source_sha256": source_hash(),

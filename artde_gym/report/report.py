@@ -11,7 +11,7 @@ from typing import Any
 
 from artde_gym.arguments import reading
 from artde_gym.errors import StoreError
-from artde_gym.evaluation.environments import robot_of
+from artde_gym.evaluation.environments import physics_of, robot_of
 from artde_gym.evaluation.provenance import MIXED
 from artde_gym.evaluation.store import write_atomically
 from artde_gym.report import frontier_page, signals, tables, training_page
@@ -95,7 +95,8 @@ def _plants(run: Run) -> list[str]:
 
 def _scenario(run: Run, laws: Laws, album: Album, scenario: str, said: list[str]) -> str:
     entry, cell = SCENARIOS.get(scenario), run.cell(scenario)
-    parts = [paragraph(f"{cell['env_id']}: {entry.text}." if entry else f"{cell['env_id']}.", "soft")]
+    place = f"{cell['env_id']} in {physics_of(cell['kwargs'])}"
+    parts = [paragraph(f"{place}: {entry.text}." if entry else f"{place}.", "soft")]
     parts += [bullets(said) if said else "", tables.falls(run, scenario)]
     if run.result.episodes.loc[run.result.episodes["scenario"] == scenario, "fell"].any():
         parts.append(tables.survival(run, scenario))

@@ -8,14 +8,16 @@ from typing import Any
 import numpy as np
 
 from artde_gym.arrays import Array
-from artde_gym.sim.bullet import BulletEngine, bullet
 from artde_gym.sim.engine import Engine
+from artde_gym.sim.factory import missing_bullet
+
+MAX_CLIENTS = 1024  # of a process, a limit of PyBullet's
 
 
 def joint_loop(engine: Engine) -> Callable[[Array], Any]:
     """A function of joint torques: write them, step, read the joints."""
-    if isinstance(engine, BulletEngine):
-        client, robot, joints = engine._client, engine._robot, engine._joints
+    if engine.name == "bullet":
+        bullet, client, robot, joints = _bullet(engine)
 
         def in_bullet(tau: Array) -> Any:
             bullet.setJointMotorControlArray(
@@ -37,8 +39,8 @@ def joint_loop(engine: Engine) -> Callable[[Array], Any]:
 
 def body_loop(engine: Engine, steps: int) -> Callable[[Array], Any]:
     """A function of a wrench [u1 (N), u2, u3, u4 (Nm)]: `steps` times write it and step, then read the body."""
-    if isinstance(engine, BulletEngine):
-        client, robot, origin = engine._client, engine._robot, (0.0, 0.0, 0.0)
+    if engine.name == "bullet":
+        (bullet, client, robot, _), origin = _bullet(engine), (0.0, 0.0, 0.0)
 
         def in_bullet(wrench: Array) -> Any:
             u1, *torque = wrench.tolist()
@@ -66,7 +68,22 @@ def body_loop(engine: Engine, steps: int) -> Callable[[Array], Any]:
     return in_mujoco
 
 
+def open_clients() -> int:
+    """Count Bullet's physics clients that are open in this process; MuJoCo has none."""
+    if missing_bullet():
+        return 0
+    from artde_gym.sim.quiet import bullet
+
+    return sum(bool(bullet.isConnected(physicsClientId=client)) for client in range(MAX_CLIENTS))
+
+
+def _bullet(engine: Any) -> tuple[Any, Any, Any, Any]:
+    from artde_gym.sim.quiet import bullet  # not everywhere; the engine that was given has it
+
+    return bullet, engine._client, engine._robot, engine._joints
+
+
 def _mujoco(engine: Any) -> tuple[Any, Any, Any, Any]:
-    import mujoco  # an extra; the engine that was given has it
+    import mujoco
 
     return mujoco, engine._model, engine._data, engine._joints

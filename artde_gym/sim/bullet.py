@@ -15,7 +15,7 @@ import weakref
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pybullet_data
@@ -31,7 +31,6 @@ from artde_gym.sim.ground import SUN, Shadow, paint
 from artde_gym.sim.quiet import bullet
 from artde_gym.sim.rotation import Quaternion, moved, rotated
 
-MAX_CLIENTS = 1024  # of a process, a limit of PyBullet's
 GEAR_ITERATIONS = 60  # of the solver; with 30, what is left over in the gears raises ARTDE's RMSE in S1 by a third
 BARE_ITERATIONS = 50  # without gears
 GEAR_FORCE = 1e6  # N, more than any gear carries
@@ -55,6 +54,8 @@ class _Snapshot(NamedTuple):
 
 class BulletEngine:
     """One robot on a plane in a Bullet world of its own."""
+
+    name: Literal["bullet", "mujoco"] = "bullet"
 
     def __init__(self, spec: RobotSpec, time_step: float = 0.001) -> None:
         self.spec = spec = spec.with_rotor_links() if any(spec.armature) else spec
@@ -404,11 +405,6 @@ class BulletEngine:
 
 def _rotation(quat_xyzw: Quaternion) -> Array:
     return np.array(bullet.getMatrixFromQuaternion(quat_xyzw)).reshape(3, 3)
-
-
-def open_clients() -> int:
-    """How many physics clients are open in this process."""
-    return sum(bool(bullet.isConnected(physicsClientId=client)) for client in range(MAX_CLIENTS))
 
 
 def _disconnect(client: int) -> None:

@@ -9,6 +9,7 @@ import atexit
 import ctypes
 import importlib
 import os
+import sys
 import weakref
 from typing import Any
 
@@ -77,7 +78,9 @@ class Canvas:
 
 
 def _context() -> Any:
-    """An OpenGL context without a display."""
+    """An OpenGL context without a display; macOS and Windows have one of their own, which MuJoCo knows."""
+    if sys.platform != "linux":
+        return importlib.import_module("mujoco.gl_context").GLContext(1, 1)
     chosen = os.environ.get("MUJOCO_GL", "").lower()
     for name in (chosen,) if chosen in _LIBRARIES else _LIBRARIES:
         try:

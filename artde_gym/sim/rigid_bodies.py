@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike
 
-from artde_gym.arrays import Array
+from artde_gym.arrays import Array, total
 from artde_gym.multibody.dynamics import GRAVITY
 from artde_gym.multibody.spec import Vector
 
@@ -39,7 +39,7 @@ class MassProperties(NamedTuple):
 
 def composite(*parts: MassProperties) -> MassProperties:
     """Several bodies fixed to each other as one."""
-    mass = sum(part.mass for part in parts)
+    mass = total(part.mass for part in parts)
     com = np.sum([part.mass * np.asarray(part.com) for part in parts], axis=0) / mass
     inertia = np.zeros((3, 3))
     for part in parts:

@@ -26,6 +26,7 @@ from controllers.laws.tde import ConstantGains, equivalent_gains
 from controllers.laws.tracking import Signals, components
 from controllers.laws.vectors import joined
 from controllers.presets import PRESETS
+from documentation.architecture import rooms
 from documentation.plant import ARM, DURATION, LIFT, LOADED, PUSHED, Plant, Run, modelled, simulate
 
 ARM_PERIOD, LIFT_PERIOD = 0.004, 0.015  # s
@@ -212,6 +213,7 @@ def geometric() -> str:
 
 
 FIGURES: dict[str, Callable[[], str]] = {
+    "rooms": rooms,
     "tde": tde,
     "atde": atde,
     "artde": artde,

@@ -42,6 +42,7 @@ def generated() -> dict[str, str]:
         f"policies/{card.parent.name}.md": _moved(card.read_text(encoding="utf-8"), r"\.\./", "") for card in cards()
     }
     pages["results.md"] = _part_of_readme("What holds so far")
+    pages["contributing.md"] = _linked_to_site((ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"))
     pages["changelog.md"] = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     return pages
 
@@ -99,6 +100,11 @@ def _part_of_readme(title: str) -> str:
     if found is None:
         raise ValueError(f"README.md has no part {title!r}")
     return f"# {title}\n" + _moved(found[1], r"baselines/policies/", "policies/").replace("](docs/", "](")
+
+
+def _linked_to_site(text: str) -> str:
+    """Turn links into docs/ into links of the site, and links to other files into their names."""
+    return re.sub(r"\[([^\]]+)\]\((?!docs/|https?:)[^)]+\)", r"`\1`", text).replace("](docs/", "](")
 
 
 def _moved(text: str, before: str, after: str) -> str:

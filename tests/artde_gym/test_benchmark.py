@@ -39,6 +39,7 @@ def test_the_bare_loops_do_what_the_environments_do(engine: str) -> None:
     assert vehicle._engine.read().position[2] - 0.6 == pytest.approx(0.5 * 2.0 * 0.15**2, rel=0.02)
 
 
+@pytest.mark.bullet
 def test_a_quick_run_writes_json_and_a_page(tmp_path: Path) -> None:
     arguments = ["benchmark", "--quick", "--sections", "walk,peers", "--json", f"{tmp_path}/b.json"]
     outcome = CliRunner().invoke(app, [*arguments, "--page", f"{tmp_path}/b.md"], env={"COLUMNS": "80"})

@@ -16,7 +16,7 @@ import artde_gym
 import controllers
 from artde_gym.errors import ActionError, ArtdeGymError, DisturbanceError, OptionError, UnknownNameError
 from artde_gym.info import fall_reason
-from artde_gym.sim.factory import EngineName
+from artde_gym.sim.factory import EngineName, installed_engines
 
 ID = "BipedWalk-Payload-v0"
 
@@ -87,7 +87,7 @@ def _trajectory_elsewhere(engine_name: EngineName) -> bytes:
 
 
 def test_same_seed_same_bits_in_another_process() -> None:
-    names: list[EngineName] = ["bullet", "mujoco"]
+    names: list[EngineName] = [*installed_engines()]
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         there = pool.map(_trajectory_elsewhere, names)
     assert [_trajectory_elsewhere(name) for name in names] == there

@@ -22,7 +22,6 @@ from artde_gym.disturbances.schedule import EVENTS
 from artde_gym.multibody.dynamics import RigidBodyTree
 from artde_gym.multibody.spec import RobotSpec
 from artde_gym.robots.ojas.model import HIP_OFFSET, SIDES, TOTAL_MASS, ojas
-from artde_gym.sim.bullet import bullet
 from artde_gym.sim.engine import Engine, State
 from artde_gym.sim.factory import EngineName, make_engine
 from artde_gym.sim.mujoco import MujocoEngine, mj
@@ -136,6 +135,13 @@ def rotation(quat_xyzw: tuple[float, float, float, float]) -> np.ndarray:
     )
 
 
+def bullet() -> Any:
+    """PyBullet, where the engine under test has it."""
+    from artde_gym.sim.quiet import bullet
+
+    return bullet
+
+
 class Mechanics:
     """A simulated robot in our own rigid-body algebra; held joints move, so all of them are read."""
 
@@ -147,7 +153,7 @@ class Mechanics:
             joints = [self.engine._data.joint(name) for name in self.tree.joints]
             return np.concatenate([joint.qpos for joint in joints]), np.concatenate([joint.qvel for joint in joints])
         links = [self.engine._links[name] for name in self.tree.joints]
-        states = bullet.getJointStates(self.engine._robot, links, physicsClientId=self.engine._client)
+        states = bullet().getJointStates(self.engine._robot, links, physicsClientId=self.engine._client)
         return np.array([state[0] for state in states]), np.array([state[1] for state in states])
 
     def momentum(self) -> np.ndarray:
@@ -174,7 +180,7 @@ def payload_velocity(engine: Any) -> np.ndarray:
         jacobian = np.zeros((3, engine._model.nv))
         mj.mj_jacBodyCom(engine._model, engine._data, jacobian, None, engine._blueprint.payload)
         return jacobian @ engine._data.qvel
-    return np.array(bullet.getBaseVelocity(engine._payload, physicsClientId=engine._client)[0])
+    return np.array(bullet().getBaseVelocity(engine._payload, physicsClientId=engine._client)[0])
 
 
 def flying(engine_name: EngineName, spec: RobotSpec, gravity: float = 0.0) -> Engine:

@@ -17,7 +17,7 @@ from artde_gym.multibody.dynamics import RigidBodyTree
 from artde_gym.multibody.spec import RobotSpec, box_link
 from artde_gym.robots.ojas.model import ojas
 from artde_gym.sim.engine import Camera, Engine, State
-from artde_gym.sim.factory import EngineName, make_batch, make_engine
+from artde_gym.sim.factory import EngineName, make_engine
 
 DT = 0.001
 G = 9.81
@@ -349,23 +349,6 @@ def test_the_camera_looks_where_it_is_told(drawing_engine: EngineName) -> None:
 def test_unknown_engines_are_refused() -> None:
     with pytest.raises(OptionError, match=r"'ode'.*'bullet', 'mujoco'"):
         make_engine("ode", ojas(), DT)  # pyright: ignore[reportArgumentType]
-
-
-def test_an_engine_that_is_not_installed_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "mujoco", None)
-    monkeypatch.delitem(sys.modules, "artde_gym.sim.mujoco", raising=False)
-    monkeypatch.delitem(sys.modules, "artde_gym.sim.mujoco_canvas", raising=False)
-    with pytest.raises(OptionError, match=r"'mujoco'.*'bullet'.*artde-gym\[mujoco\]"):
-        make_engine("mujoco", ojas(), DT)
-
-
-@pytest.mark.parametrize("missing", ["mujoco", "mujoco.batch"])
-def test_batches_say_what_they_need(missing: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("artde_gym.sim.mujoco_batch", "artde_gym.sim.mujoco_world"):
-        monkeypatch.delitem(sys.modules, name, raising=False)
-    monkeypatch.setitem(sys.modules, missing, None)
-    with pytest.raises(OptionError, match=r"'mujoco'.*3\.17.*artde-gym\[mujoco\]"):
-        make_batch("mujoco", ojas(), 1, DT, 1)
 
 
 def test_mujoco_refuses_rotors_that_are_links() -> None:

@@ -286,7 +286,7 @@ def test_folder_continuation_and_refusal(tmp_path: Path) -> None:
     record = json.loads((folder / "frontier.json").read_text())
     assert record["complete"]
     assert record["configuration"]["axis"]["tolerance"] == 0.5
-    assert record["provenance"]["packages"]["pybullet"]
+    assert record["provenance"]["packages"]["mujoco"]
     assert png_size((folder / "frontier.png").read_bytes()) > (800, 400)
 
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}

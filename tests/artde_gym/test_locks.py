@@ -17,7 +17,7 @@ import pytest
 from artde_gym.cli.arguments import folder_of
 from artde_gym.errors import StoreError
 from artde_gym.evaluation import evaluate
-from artde_gym.evaluation.lock import LOCK, locked
+from artde_gym.evaluation.lock import HOLDER, LOCK, locked
 from artde_gym.studies import frontier, reproduce, sweep, tune
 
 HOLD = """
@@ -78,7 +78,7 @@ def test_whoever_writes_a_folder_is_named_and_when_it_is_killed_the_folder_is_fr
             write(tmp_path / "run")
         for word in (f"process {holder.pid} on {platform.node()}", "'-c ", str(tmp_path / "run")):
             assert word in str(caught.value), name
-    assert [path.name for path in (tmp_path / "run").iterdir()] == [LOCK]
+    assert {path.name for path in (tmp_path / "run").iterdir()} == {LOCK, HOLDER}
     os.kill(holder.pid, signal.SIGKILL)
     holder.wait()
     with locked(tmp_path / "run"):  # what the killed one left behind holds nobody up

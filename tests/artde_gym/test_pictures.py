@@ -87,6 +87,7 @@ def test_the_sun_casts_a_shadow_where_geometry_says(drawing_engine: EngineName) 
     engine.close()
 
 
+@pytest.mark.bullet
 def test_a_shadow_is_a_projection_along_the_sun_of_every_box() -> None:
     """Corners of a robot's boxes, by its rigid-body algebra, fall into the hull of its shadow's polygons."""
     spec, rng = ojas("none"), np.random.default_rng(0)

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 import artde_gym  # noqa: F401  # registers the environments
 from artde_gym.disturbances import KINDS
 from artde_gym.errors import ArtdeGymError
-from artde_gym.sim.bullet import open_clients
+from artde_gym.sim.bare import open_clients
 
 REFUSED = (ArtdeGymError, gym.error.Error, gym.error.ClosedEnvironmentError)
 SINGLE = ("BipedWalk-Payload-v0", "BipedPush-v0", "QuadInfinity-Payload-v0")
@@ -237,6 +237,7 @@ def test_any_order_of_calls_works_or_is_refused(name: str, batch: bool, engine: 
     check()
 
 
+@pytest.mark.bullet
 def test_no_client_is_left_behind() -> None:
     """Closed twice, forgotten, closed while an exception is on its way, or never finished being made."""
     gc.collect()

@@ -5,7 +5,6 @@ import math
 from typing import Any
 
 import numpy as np
-import pybullet as bullet
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -19,7 +18,6 @@ from artde_gym.robots.ojas import model as constants
 from artde_gym.robots.ojas.leg_ik import leg_angles
 from artde_gym.robots.ojas.model import ojas
 from artde_gym.robots.ojas.walking import walking_pattern
-from artde_gym.sim.bullet import BulletEngine
 from artde_gym.sim.factory import make_engine
 from controllers.laws.validity import tde_eigenvalues, tde_is_valid
 
@@ -246,10 +244,13 @@ def test_feet_out_of_reach_are_refused(ankle, thigh, shank):
 # --------------------------------------------------------------------------------------------------------- in an engine
 
 
+@pytest.mark.bullet
 @pytest.mark.parametrize("name", ["rotor-fixed-links", "rotor-revolute-links", "lumped-fixed", "none-revolute"])
 def test_bullet_has_exactly_the_inertias_of_the_spec(name):
+    from artde_gym.sim.quiet import bullet
+
     spec = SPECS[name]
-    engine = BulletEngine(spec)
+    engine: Any = make_engine("bullet", spec, 0.001)
     robot, client = engine._robot, engine._client
     links = {bullet.getJointInfo(robot, i, physicsClientId=client)[12].decode(): i for i in range(len(spec.links) - 1)}
     links[spec.base.name] = -1

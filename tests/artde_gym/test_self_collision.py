@@ -12,7 +12,6 @@ from artde_gym.sim.factory import make_engine
 @pytest.mark.parametrize("engine", ["bullet", "mujoco"])
 def test_feet_stop_each_other_only_if_the_spec_says_so(engine):
     """In the air, hips roll the feet against each other: they meet when the soles' edges, 2 cm apart, do."""
-    pytest.importorskip(engine if engine != "bullet" else "pybullet")
     ends = []
     for collides in (False, True):
         spec = dataclasses.replace(ojas("lumped"), feet_collide=collides)
@@ -33,7 +32,6 @@ def test_feet_stop_each_other_only_if_the_spec_says_so(engine):
 
 @pytest.mark.parametrize("engine", ["bullet", "mujoco"])
 def test_a_walk_as_planned_does_not_notice(engine):
-    pytest.importorskip(engine if engine != "bullet" else "pybullet")
     ends = []
     for collides in (False, True):
         env = gym.make(

@@ -127,8 +127,8 @@ def test_a_variance_below_zero_is_refused(tmp_path: Path) -> None:
         baselines.load(folder)
 
 
+@pytest.mark.torch
 def test_a_damaged_run_is_continued_or_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("stable_baselines3")
     import torch
 
     from baselines import tasks

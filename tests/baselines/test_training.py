@@ -11,8 +11,6 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
-
-pytest.importorskip("stable_baselines3")
 import torch
 from scipy import stats
 from stable_baselines3.common.env_checker import check_env
@@ -223,7 +221,6 @@ FALLING = {
 
 def test_the_adapter_is_the_single_biped_to_the_bit():
     """Falls within a decision, and what begins after them, included."""
-    pytest.importorskip("mujoco")
     vector = batched("BipedPush-v0", Recipe("ojas"), 3, FALLING)
     single = ResidualEnv(gym.make("BipedPush-v0", disable_env_checker=True, engine="mujoco", **FALLING), Recipe("ojas"))
     vector.seed(7)

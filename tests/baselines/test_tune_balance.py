@@ -41,9 +41,6 @@ def test_the_law_is_linear_in_the_state_of_its_plane(residual):
 @pytest.fixture
 def tuning(monkeypatch):
     """Small generations."""
-    pytest.importorskip("cmaes")
-    pytest.importorskip("stable_baselines3")
-    pytest.importorskip("mujoco")
     import dataclasses
 
     from baselines import tasks, tune_balance
@@ -64,6 +61,7 @@ def generations(folder) -> list[dict[str, Any]]:
     return json.loads((folder / "generations.json").read_text())["generations"]
 
 
+@pytest.mark.torch
 def test_a_continued_tuning_equals_one_that_never_stopped(tuning, tmp_path):
     tuning.tune(training(800), tmp_path / "whole")
     tuning.tune(training(1), tmp_path / "parts")
@@ -73,6 +71,7 @@ def test_a_continued_tuning_equals_one_that_never_stopped(tuning, tmp_path):
     assert len(generations(tmp_path / "whole")) > 1
 
 
+@pytest.mark.torch
 def test_candidates_are_judged_as_if_each_were_alone(tuning):
     kwargs = {"duration": tuning.DURATION, "self_collision": True, "disturbances": tuning._PUSH}
     env = tuning.batched("BipedPush-v0", Recipe("ojas"), 4, kwargs)
@@ -99,8 +98,11 @@ def test_candidates_are_judged_as_if_each_were_alone(tuning):
     alone.close()
 
 
+@pytest.mark.torch
 def test_what_has_no_balance_law_or_no_batch_is_refused(tuning, tmp_path):
     with pytest.raises(TrainingError, match="the biped's synergies, of which the law has gains"):
         tuning.tune(Training("BipedPush-v0", Recipe("ojas", channel="joints"), "cma-es"), tmp_path / "joints")
-    with pytest.raises(TrainingError, match="engine is None; allowed: 'mujoco'"):
-        tuning.tune(Training("BipedPush-v0", Recipe("ojas"), "cma-es"), tmp_path / "bullet")
+    with pytest.raises(TrainingError, match="engine is 'bullet'; allowed: 'mujoco'"):
+        tuning.tune(
+            Training("BipedPush-v0", Recipe("ojas"), "cma-es", env_kwargs={"engine": "bullet"}), tmp_path / "bullet"
+        )

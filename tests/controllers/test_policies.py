@@ -6,9 +6,6 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
-from stable_baselines3.common.evaluation import evaluate_policy
-from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import DummyVecEnv
 
 import artde_gym
 import controllers
@@ -232,9 +229,14 @@ def test_a_controller_of_the_users_own(env, tmp_path, monkeypatch):
 # ---------------------------------------------------------------------------------------------------------- in the loop
 
 
+@pytest.mark.torch
 @pytest.mark.parametrize("name", ["tde", "artde", "computed-torque"])
 @pytest.mark.parametrize("count", [1, 2])
 def test_evaluate_policy_of_stable_baselines(name, count):
+    from stable_baselines3.common.evaluation import evaluate_policy
+    from stable_baselines3.common.monitor import Monitor
+    from stable_baselines3.common.vec_env import DummyVecEnv
+
     def build() -> Monitor:
         return Monitor(make_env(duration=0.1))
 

@@ -7,9 +7,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from stable_baselines3.common.evaluation import evaluate_policy
-from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import DummyVecEnv
 
 import artde_gym  # noqa: F401  # registers the environment
 import controllers
@@ -253,8 +250,13 @@ def test_gains_as_printed_drift_in_the_wind_and_bounded_ones_do_not():
     assert grown["artde-robust"] < 0.02 < 0.05 < grown["artde"]
 
 
+@pytest.mark.torch
 @pytest.mark.parametrize("count", [1, 2])
 def test_evaluate_policy_of_stable_baselines(count):
+    from stable_baselines3.common.evaluation import evaluate_policy
+    from stable_baselines3.common.monitor import Monitor
+    from stable_baselines3.common.vec_env import DummyVecEnv
+
     def build() -> Monitor:
         return Monitor(gym.make(ID, duration=0.3))
 

@@ -34,7 +34,7 @@ import pandas as pd
 
 from artde_gym.errors import OptionError, among
 from artde_gym.evaluation import statistics
-from artde_gym.evaluation.environments import Backend, arguments_of
+from artde_gym.evaluation.environments import Backend, arguments_of, with_engine
 from artde_gym.evaluation.evaluate import CUSTOM, Cell, Update, checked_gains, evaluate, labelled, tried
 from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.provenance import MIXED, continued, provenance
@@ -275,7 +275,7 @@ def _arguments(env_id: str, backend: Backend, varied: Axis, given: Mapping[str, 
             raise OptionError(f"argument of {env_id}", name, among(name, known))
         if name == "disturbances" or (varied.kind is None and name == varied.name):
             raise OptionError("env_kwargs", name, "arguments that are not varied; disturbances are given on their own")
-    return dict(given)
+    return with_engine(env_id, given, backend)
 
 
 class _Folder:

@@ -79,7 +79,7 @@ def reproduce(
     episodes: int = 10,
     seed: int = 0,
     workers: int = 1,
-    engine: str = "bullet",
+    engine: str | None = None,
     allow_mixed: bool = False,
     on_progress: Callable[[str, Update], None] | None = None,
 ) -> Reproduction:
@@ -94,7 +94,7 @@ def reproduce(
         episodes: seeded episodes of each controller in each scenario.
         seed: of everything.
         workers: processes; the results do not depend on it.
-        engine: physics engine.
+        engine: physics engine; None for the default one.
         allow_mixed: as for `evaluate`.
         on_progress: called with what runs ("episodes", "ablation in S1") and the progress of its episodes.
 

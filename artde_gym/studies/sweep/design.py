@@ -280,7 +280,8 @@ def _point(settings: Mapping[str, Any], backend: Backend, names: set[Any]) -> Po
     for name in settings["gains"]:
         if name not in names:
             raise UnknownNameError("gains", name, among(name, [str(one) for one in names if one is not None]))
-    (cell,) = cells_of(settings["env"], settings["scenario"], settings["env_kwargs"], settings["disturbances"])
+    given = (settings["env"], settings["scenario"], settings["env_kwargs"], settings["disturbances"])
+    (cell,) = cells_of(*given, backend)
     gains, seed, spec = settings["gains"].get(controller, {}), settings["seed"], known[controller]
     means = cell._replace(kwargs=canonical.arguments(cell.kwargs, cell.env_id, backend))
     decides = [*means, controller, identity_of(spec).value, canonical.numbers(gains), seed, backend]

@@ -30,7 +30,7 @@ import pandas as pd
 
 from artde_gym.arguments import reading, whole
 from artde_gym.errors import OptionError, StoreError
-from artde_gym.evaluation.environments import Backend, single, tracking_of
+from artde_gym.evaluation.environments import Backend, single, tracking_of, with_engine
 from artde_gym.evaluation.evaluate import DEFAULT_ENVIRONMENT, MOST_EPISODES, Update, evaluate, policy_for
 from artde_gym.evaluation.identity import behind
 from artde_gym.evaluation.lock import is_empty, writes_folder
@@ -128,7 +128,7 @@ def tune(
     common: dict[str, Any] = {
         "scenario": scenario,
         "disturbances": disturbances,
-        "env_kwargs": dict(env_kwargs or {}),
+        "env_kwargs": with_engine(env_id, env_kwargs or {}, backend),
         "backend": backend,
     }
     configuration = {
