@@ -23,6 +23,7 @@ from artde_gym.evaluation.identity import behind, identity_of
 from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.metrics import Span
 from artde_gym.evaluation.provenance import provenance
+from artde_gym.evaluation.registered import METRICS, require_metrics
 from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.rollout import Episode, Policy, run_episode
 from artde_gym.evaluation.seeds import episode_seed, with_exact_seeds
@@ -53,7 +54,10 @@ class Cell(NamedTuple):
 
 
 class Task(NamedTuple):
-    """Episodes of one controller that run at once: a single one, or a chunk. The first `traced` leave traces."""
+    """Episodes of one controller that run at once: a single one, or a chunk. The first `traced` leave traces.
+
+    `metrics` are the registered ones that the process must know.
+    """
 
     backend: Backend
     cell: Cell
@@ -64,6 +68,7 @@ class Task(NamedTuple):
     seeds: list[int]
     trace_hz: float
     traced: int
+    metrics: tuple[str, ...] = ()
 
 
 class Update(NamedTuple):
@@ -153,6 +158,7 @@ def evaluate(
             "backend": backend,
             "traced": traced,
             "trace_hz": trace_hz if np.isfinite(trace_hz) else "all",
+            **({"metrics": sorted(METRICS)} if METRICS else {}),
         }
         made_by = provenance(evidence, {name: identity.by for name, identity in identities.items()})
         store = Store(Path(out), configuration, made_by, allow_mixed=allow_mixed)
@@ -169,6 +175,7 @@ def evaluate(
             [episode_seed(seed, episode) for episode in left],
             trace_hz,
             sum(episode < traced for episode in left),
+            tuple(METRICS),
         )
         for chunk in chunks_of(episodes, 1 if backend == "single" else CHUNK)  # outermost: whole pairs are left behind
         for cell in cells
@@ -382,6 +389,7 @@ def labels_of(task: Task, number: int) -> dict[str, Any]:
 
 def run_task(task: Task, on_progress: Callable[[float], None]) -> list[Episode]:
     """Run the episodes of a task; `on_progress` is called with the simulated time (s)."""
+    require_metrics(task.metrics)
     options: dict[str, Any] = {"trace_hz": task.trace_hz, "phases": task.cell.phases, "on_progress": on_progress}
     if task.backend == "batch":
         env = _vector(task.cell, len(task.seeds))

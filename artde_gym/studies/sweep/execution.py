@@ -29,6 +29,7 @@ from artde_gym.evaluation.evaluate import (
 )
 from artde_gym.evaluation.identity import behind
 from artde_gym.evaluation.lock import writes_folder
+from artde_gym.evaluation.registered import METRICS
 from artde_gym.evaluation.rollout import Episode
 from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.evaluation.workers import Runs, check_workers, run_here, run_parallel
@@ -220,6 +221,7 @@ def _task(plan: Design, name: str, point: Point, episodes: list[int]) -> Task:
         [episode_seed(point.seed, episode) for episode in episodes],
         TRACE_HZ,
         traced=0,
+        metrics=tuple(METRICS),
     )
 
 
