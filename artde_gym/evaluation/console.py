@@ -92,8 +92,8 @@ class _Tables:
         rows = [self._result.rows(scenario, controller) for controller in self._controllers]
         count = max(map(len, rows))
         note = f"{count} seeded episode{'s' if count > 1 else ''} a controller; mean, change with its 95 % interval"
-        if reference in thesis.TABLES:
-            note += f"; thesis: {thesis.TABLES[reference]}"
+        if table := thesis.reported(reference).table:
+            note += f"; thesis: {table}"
         parts: list[RenderableType] = [title, Text(note, style="dim"), self._falls(scenario, reference)]
         tracking = tracking_of(pd.concat(rows)["env"].iloc[0])
         own = [name for name in METRICS if name in self._result.metrics]

@@ -71,7 +71,7 @@ def survival(run: Run, scenario: str) -> str:
         chart.line(x, y, shown[name], text=name, kind="path")
         chart.marker(end, float(y[-1]), shown[name], f"{name}: {y[-1]:.0f} %")
     caption = "Survival: the share of episodes in which the robot has not fallen yet."
-    printed = thesis.TIME_TO_FALL.get(_reference(scenario) or "", {})
+    printed = thesis.reported(_reference(scenario)).time_to_fall
     for name, time in printed.items():
         if name in shown and time <= end:
             chart.cross(time, 50.0, shown[name], f"{name} fell at {time:g} s in the thesis")
