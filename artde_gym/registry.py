@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from artde_gym.errors import OptionError, UnknownNameError, among
 
 T = TypeVar("T")
+
+
+def pointed(group: str) -> dict[str, str]:
+    """Return what the entry points of a group name, "module:object" by name, without importing any of it.
+
+    The project's own come before others, in a fixed order.
+    """
+    return {point.name: point.value for point in _in_order(group)}
+
+
+def _in_order(group: str) -> list[EntryPoint]:
+    own = "artde-gym"
+    return sorted(entry_points(group=group), key=lambda p: (p.dist is None or p.dist.name != own, p.name))
 
 
 class Registry(Mapping[str, T], Generic[T]):
@@ -71,8 +84,7 @@ class Registry(Mapping[str, T], Generic[T]):
         if self._loaded:
             return
         self._loaded = True  # first: what is loaded may look in here
-        points = entry_points(group=self.group)
-        for point in sorted(points, key=lambda p: (p.dist is None or p.dist.name != "artde-gym", p.name)):
+        for point in _in_order(self.group):
             loaded = point.load()
             for name, entry in ({point.name: loaded} if self._unpack is None else self._unpack(loaded)).items():
                 self._add(name, entry, replace=False)

@@ -23,8 +23,10 @@ def numeric(sampled: Mapping[str, Any], words: Words) -> dict[str, Any]:
     """Name each number, words being replaced by numbers and lists of entries by arrays."""
     told: dict[str, Any] = {}
     for kind, value in sampled.items():
-        given = value[0] if KINDS[kind].repeated else value
-        for parameter in (one for one in KINDS[kind].parameters if one.name in given):
+        entries = value if KINDS[kind].repeated else (value,)
+        for parameter in KINDS[kind].parameters:
+            if not all(parameter.name in entry for entry in entries):
+                continue  # one of several of which only one is given
             told[f"disturbance.{kind}.{parameter.name}"] = (
                 np.array([number_of(parameter, entry[parameter.name], words) for entry in value])
                 if KINDS[kind].repeated

@@ -26,6 +26,7 @@ from artde_gym.envs.options import disturbances_in, warn_of_idle
 from artde_gym.errors import ActionError, OptionError
 from artde_gym.info import FELL, REWARD, Columns, Mask, SampledTable, cleared, masked, prefixed
 from artde_gym.layout import Layout
+from artde_gym.sim.factory import resolve_engine
 from artde_gym.tracking import Tracking
 
 Order = Literal["C", "F"]
@@ -224,8 +225,8 @@ class BatchEnv(Counted, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
         """Tell where a vector runs that nobody has asked to run there."""
         if engine is None:
             warnings.warn(
-                f"{type(self).__name__} runs in {self.own_engine!r}, gym.make in 'bullet' unless told otherwise, so "
-                f"that results differ; give engine={self.own_engine!r} if this is meant",
+                f"{type(self).__name__} runs in {self.own_engine!r}, gym.make in {resolve_engine(None)!r} unless told "
+                f"otherwise, so that results differ; give engine={self.own_engine!r} if this is meant",
                 stacklevel=6,  # where gymnasium.make_vec was called
             )
         elif engine != self.own_engine:

@@ -66,12 +66,16 @@ def with_engine(env_id: str, kwargs: Mapping[str, Any], backend: Backend = "sing
     if known is None:
         return dict(kwargs)
     given = kwargs.get("engine", known.default)
-    return {**kwargs, "engine": resolve_engine(given) if backend == "single" else given}
+    if backend == "single":
+        return {**kwargs, "engine": resolve_engine(given)}
+    creator: Any = load_env_creator(_entry_point(env_id, backend))
+    return {**kwargs, "engine": getattr(creator, "own_engine", None) if given is None else given}
 
 
 def physics_of(kwargs: Mapping[str, Any]) -> str:
     """Say in which physics an environment with arguments of `with_engine` runs."""
-    return ENGINES.get(kwargs["engine"], str(kwargs["engine"])) if "engine" in kwargs else "NumPy"
+    name = kwargs.get("engine", "NumPy")
+    return ENGINES[name].title if name in ENGINES else str(name)
 
 
 def ours() -> list[str]:

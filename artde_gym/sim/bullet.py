@@ -15,7 +15,7 @@ import weakref
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pybullet_data
@@ -53,11 +53,11 @@ class _Snapshot(NamedTuple):
 
 
 class BulletEngine:
-    """One robot on a plane in a Bullet world of its own."""
+    """One robot on a plane in a Bullet world of its own; it draws everywhere, whatever `renders` says."""
 
-    name: Literal["bullet", "mujoco"] = "bullet"
+    name = "bullet"
 
-    def __init__(self, spec: RobotSpec, time_step: float = 0.001) -> None:
+    def __init__(self, spec: RobotSpec, time_step: float = 0.001, *, renders: bool = False) -> None:
         self.spec = spec = spec.with_rotor_links() if any(spec.armature) else spec
         self.time_step = time_step
         self._client = bullet.connect(bullet.DIRECT)

@@ -205,8 +205,8 @@ def test_cost_of_transport_knows_what_was_drawn() -> None:
     fields["tau_applied"][..., 0], fields["qd"][..., 0] = 3.0, 1.0
 
     def cost(**disturbances: Any) -> float:
-        drawn = env.reset(seed=0, options={"disturbances": disturbances})[1]["disturbances"]
-        metrics = metrics_for(env, [drawn], ())
+        env.reset(seed=0, options={"disturbances": disturbances})
+        metrics = metrics_for(env, [env.sampled_disturbances], ())
         metrics.add(0, fields, None)
         return metrics.rows()[0]["cost_of_transport"]
 

@@ -82,7 +82,7 @@ def test_many_robots_walk_as_the_single_one_to_the_bit(period: float) -> None:
         given = {"grf_pulse": {**pulse, "trigger": trigger}, "push": [kick]}
         kwargs: dict[str, Any] = {"control_period": period, "disturbances": given, **BRISK}
         steps = round(2.75 / period)
-        env = gym.make_vec(ID, num_envs=3, vectorization_mode="vector_entry_point", **kwargs)
+        env = gym.make_vec(ID, num_envs=3, vectorization_mode="vector_entry_point", engine="mujoco", **kwargs)
         together = _walk(env, [1, 2, 3], steps)
         for row, seed in enumerate([1, 2, 3]):
             alone = _walk(gym.make(ID, disable_env_checker=True, engine="mujoco", **kwargs).unwrapped, seed, steps)

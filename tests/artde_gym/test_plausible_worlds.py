@@ -91,7 +91,8 @@ def test_links_of_another_mass(engine: Engine) -> None:
 @pytest.mark.parametrize("arms", ["fixed", "revolute"])
 def test_the_distribution_of_mass_keeps_the_weight(engine_name: EngineName, legs: float, arms: str) -> None:
     env = make({"mass_distribution": legs}, engine=engine_name, arms=arms)
-    factors = env._walk._mass_factors(env.reset(seed=0)[1]["disturbances"])
+    env.reset(seed=0)
+    factors = env._walk._mass_factors(env.sampled_disturbances)
     assert {factor for name, factor in factors.items() if name in env.nominal_robot.actuated} == {legs}
     assert sum(factors[link.name] * link.mass for link in env._walk.robot.links) == pytest.approx(TOTAL_MASS)
     policy, state, (observation, _) = controllers.make("tde", env), None, env.reset(seed=0)
@@ -160,7 +161,8 @@ def walk(env: Any, seed: Any, steps: int = 150) -> np.ndarray:
 
 
 def test_a_batch_of_worlds_is_the_single_ones_to_the_bit() -> None:
-    env = gym.make_vec(ID, num_envs=3, vectorization_mode="vector_entry_point", disturbances=WORLD, duration=2.0)
+    arguments: dict[str, Any] = {"engine": "mujoco", "disturbances": WORLD, "duration": 2.0}
+    env = gym.make_vec(ID, num_envs=3, vectorization_mode="vector_entry_point", **arguments)
     together = walk(env, [4, 5, 6])
     for row, seed in enumerate([4, 5, 6]):
         np.testing.assert_array_equal(together[:, row], walk(make(WORLD, engine="mujoco"), seed))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import json
 from typing import Any
 
@@ -50,11 +49,10 @@ class Meddler(gym.Wrapper[Any, Any, Any, Any]):
 
     def reset(self, **kwargs: Any) -> tuple[Any, dict[str, Any]]:
         observation, self.info = self.env.reset(**kwargs)
-        self.info = {**self.info, "disturbances": copy.deepcopy(self.info["disturbances"])}
         return observation, self.info
 
     def step(self, action: Any) -> Any:
-        self.info["disturbances"]["payload"]["mass"] = 99.0
+        self.info["disturbance.payload.mass"] = 99.0
         return self.env.step(action)
 
 
