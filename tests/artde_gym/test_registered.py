@@ -1,5 +1,6 @@
 """Scenarios, metrics and kinds of disturbances of one's own, in scripts and with several workers."""
 
+import os
 import subprocess
 import sys
 from typing import Any
@@ -46,6 +47,51 @@ def run(workers, out):
 """
 ABOVE = "register()\nif __name__ == '__main__':\n    run(1, sys.argv[1])\n    run(2, sys.argv[2])\n"
 BELOW = "if __name__ == '__main__':\n    register()\n    run(2, sys.argv[1])\n"
+
+
+PLUG_IN = """
+import numpy as np
+
+from artde_gym.disturbances import Kind, Load, Parameter
+from artde_gym.evaluation import Metric
+from artde_gym.sim.factory import EngineSpec
+
+TORQUE = Parameter("torque", "Nm", 0.0, 20.0, None, "largest torque of friction")
+KIND = Kind("rust", "Friction.", (TORQUE,), "joints", "torque", effect=lambda values, states: Load(
+    tau=-values["torque"][:, None] * np.tanh(states.qd)))
+METRIC = Metric("knee_speed", lambda fields, _: np.abs(fields["qd"][..., 3]), "max")
+ENGINE = EngineSpec("mine", "Mine", "no_such_module:Engine", "mine")
+CLAIMS = ()
+"""
+ENTRY_POINTS = """
+[artde_gym.disturbances]
+rust = plug_in:KIND
+[artde_gym.metrics]
+knee_speed = plug_in:METRIC
+[artde_gym.engines]
+mine = plug_in:ENGINE
+[artde_gym.claims]
+plug-in = plug_in:CLAIMS
+[artde_gym.checks]
+broken = plug_in:no_such_check
+[artde_gym.benchmarks]
+more = plug_in:more
+"""
+SEEN = """
+from artde_gym.benchmark import SECTIONS
+from artde_gym.cli import app
+from artde_gym.doctor import CHECKS
+from artde_gym.sim.factory import ENGINES
+from artde_gym.studies.reproduce.claims import CLAIMS
+import sys
+
+assert {"inference", "training", "more"} <= set(SECTIONS)
+assert {"validity", "broken", "mine"} <= set(CHECKS)
+assert [*ENGINES] == ["bullet", "mujoco", "mine"]
+assert [*CLAIMS] == ["ojas", "q450", "plug-in"]
+if __name__ == "__main__":
+    app(sys.argv[1:])
+"""
 
 
 @pytest.fixture(autouse=True)
@@ -135,3 +181,26 @@ def test_a_scenario_of_ones_own_is_one_to_reset_to():
     env: Any = gym.make(WALK, duration=0.1)
     env.reset(seed=0, options={"scenario": "icy"})
     assert env.unwrapped.sampled_disturbances == {"friction": {"coefficient": 0.2}}
+
+
+def test_the_command_line_and_its_workers_find_what_a_package_brings(tmp_path, monkeypatch):
+    packed = tmp_path / "plug_in-1.0.dist-info"
+    packed.mkdir()
+    (tmp_path / "plug_in.py").write_text(PLUG_IN)
+    (packed / "METADATA").write_text("Metadata-Version: 2.1\nName: plug-in\nVersion: 1.0\n")
+    (packed / "entry_points.txt").write_text(ENTRY_POINTS)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
+    (tmp_path / "script.py").write_text(SEEN)
+    words = f"evaluate --env {WALK} --controllers tde,artde --episodes 1 --workers 2 --out {tmp_path / 'out'}".split()
+    kwargs = ["--env-kwargs", '{"duration": 0.2}', "--disturbances", '{"rust": 0.2}']
+    script = [sys.executable, str(tmp_path / "script.py")]
+    ended = subprocess.run([*script, *words, *kwargs], capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+    assert "knee_speed" in ended.stdout
+    episodes = pd.read_csv(tmp_path / "out" / "episodes.csv")
+    assert min(episodes["knee_speed"]) > 0
+    assert set(episodes["disturbance.rust.torque"]) == {0.2}
+    ended = subprocess.run([*script, "doctor", "--checks", "broken,mine"], capture_output=True, text=True)
+    said = " ".join(ended.stdout.split())
+    assert "no attribute 'no_such_check'" in said
+    assert "Mine cannot be imported (No module named 'no_such_module'): pip install 'mine'" in said
