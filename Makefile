@@ -14,7 +14,7 @@ CUDA := ^(cuda|nvidia)-|^triton=
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help evaluate test tests coverage lowest check format benchmark soak docs gallery constraints dist clean
+.PHONY: help evaluate test tests clients coverage lowest check format benchmark soak docs gallery constraints dist clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*  ## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -34,6 +34,9 @@ lowest: LEAST := 1000
 lowest: $(VENV)-lowest/dev  ## the tests with the lowest versions that pyproject.toml allows (PyTorch: the pinned one)
 	OMP_NUM_THREADS=1 $(VENV)-lowest/bin/python -m pytest -n 2 --at-least $(LEAST) -W ignore::DeprecationWarning \
 		-W ignore::PendingDeprecationWarning -W ignore::FutureWarning $(ARGS)
+
+clients: $(VENV)/core  ## train with learning libraries, in environments of their own (some: ARGS="tianshou rllib")
+	$(BIN)/python scripts/clients.py $(ARGS)
 
 check: $(VENV)/dev  ## format, lint, types and import contracts
 	$(BIN)/ruff format --check

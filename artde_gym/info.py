@@ -28,20 +28,32 @@ Columns = dict[str, NDArray[Any]]
 REWARD, FELL = "reward_", "fell_"  # in front of names
 
 
-def count_events(events: Sequence[str]) -> dict[str, int]:
-    """Count each kind of event."""
-    counts: dict[str, int] = dict.fromkeys(EVENTS, 0)
-    for name in events:
-        counts[name] += 1
-    return counts
+class EpisodeInfo:
+    """The `info` of one environment: what does not change within an episode is prepared once.
 
+    Each `info` is a new dictionary of new arrays, so that no caller can reach another one.
+    """
 
-def flag_reason(names: Sequence[str], holds: Sequence[bool]) -> dict[str, bool]:
-    """Mark the first reason that holds; none does at the start of an episode, where `holds` is empty."""
-    flags = dict.fromkeys([FELL + name for name in names], False)
-    if any(holds):
-        flags[FELL + names[list(holds).index(True)]] = True
-    return flags
+    def __init__(self, numbers: Mapping[str, Any], reasons: Sequence[str]) -> None:
+        self._names = [FELL + name for name in reasons]
+        self._arrays = [(name, value) for name, value in numbers.items() if type(value) is np.ndarray]
+        self._still = {"time_s": 0.0, **numbers, **dict.fromkeys(EVENTS, 0), **dict.fromkeys(self._names, False)}
+
+    def told(
+        self, time: float, terms: Mapping[str, float], events: Sequence[str] = (), falls: Sequence[bool] = ()
+    ) -> dict[str, Any]:
+        """Tell of a step: terms of the reward, what began or ended, and which reasons of a fall hold."""
+        info = self._still.copy()
+        info["time_s"] = time
+        for name, term in terms.items():
+            info[REWARD + name] = term
+        for name, array in self._arrays:
+            info[name] = array.copy()
+        for name in events:
+            info[name] += 1
+        if True in falls:
+            info[self._names[falls.index(True)]] = True  # the first one
+        return info
 
 
 def fall_reason(info: Mapping[str, Any], robot: int | None = None) -> str:
@@ -62,11 +74,6 @@ def prefixed(prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
     return {prefix + name: value for name, value in values.items()}
 
 
-def copied(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Copy a dictionary and the arrays in it."""
-    return {name: value.copy() if type(value) is np.ndarray else value for name, value in values.items()}
-
-
 def masked(values: Mapping[str, Any], mask: Mask) -> dict[str, Any]:
     """Put a mask beside each entry; masks that are there become narrower."""
     told: dict[str, Any] = {}
@@ -77,7 +84,9 @@ def masked(values: Mapping[str, Any], mask: Mask) -> dict[str, Any]:
 
 
 def cleared(values: Mapping[str, NDArray[Any]], where: Mask) -> Columns:
-    """Copy arrays (n,), with zeros in some environments."""
+    """Put zeros into arrays (n,) in some environments; new arrays, if there are any."""
+    if not where.any():
+        return dict(values)
     return {name: np.where(where, np.zeros((), value.dtype), value) for name, value in values.items()}
 
 
@@ -91,9 +100,28 @@ class SampledTable:
         self._n = n
         self._columns: Columns = {}
         self._known: dict[str, Mask] = {}
+        self._told: list[tuple[str, NDArray[Any], Mask | None]] = []  # mask: None where all have the entry
 
-    def enter(self, row: int, numbers: Mapping[str, Any]) -> None:
-        """Replace what one environment had."""
+    def enter(self, rows: Mapping[int, Mapping[str, Any]]) -> None:
+        """Replace what some environments had."""
+        for row, numbers in rows.items():
+            self._enter(row, numbers)
+        self._told = [
+            (name, self._columns[name], None if known.all() else known)
+            for name, known in self._known.items()
+            if known.any()
+        ]
+
+    def told(self) -> dict[str, Any]:
+        """All that is known, as new arrays, for `masked`, which makes new masks."""
+        told: dict[str, Any] = {}
+        for name, column, known in self._told:
+            told[name] = column.copy()
+            if known is not None:
+                told[f"_{name}"] = known
+        return told
+
+    def _enter(self, row: int, numbers: Mapping[str, Any]) -> None:
         for name, known in self._known.items():
             known[row] = name in numbers
         for name, value in numbers.items():
@@ -102,14 +130,6 @@ class SampledTable:
             column = self._columns[name] = self._fitted(self._columns.get(name), cell)
             column[row] = 0
             column[(row, *map(slice, cell.shape))] = cell
-
-    def told(self) -> dict[str, Any]:
-        """All that is known, as new arrays, for `masked`, which makes new masks."""
-        told: dict[str, Any] = {}
-        for name, known in self._known.items():
-            if known.any():
-                told[name], told[f"_{name}"] = self._columns[name].copy(), known
-        return told
 
     def _fitted(self, column: NDArray[Any] | None, cell: NDArray[Any]) -> NDArray[Any]:
         """The column, with room for a cell."""

@@ -122,7 +122,7 @@ class Run:
         self.state: dict[str, Any] = {"best": None, "stale": 0, "tests": []}
         self._configuration = _plain(training) | {"engine": environment_kwargs(training).get("engine")}
         _refuse_others(folder, self._configuration, {"workers"} if self.batched else set())
-        (cell,) = cells_of(training.env_id, None, environment_kwargs(training), self.task.test)
+        (cell,) = cells_of(training.env_id, None, environment_kwargs(training), self.task.test, self.backend)
         tried(self.backend, cell)
 
     @property

@@ -12,6 +12,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from artde_gym.arguments import number
 from artde_gym.cli.arguments import json_object
 from artde_gym.errors import OptionError
 from artde_gym.evaluation.store import write_atomically
@@ -39,6 +40,8 @@ def design(
     if robot not in ROBOTS:
         raise OptionError("robot", robot, ", ".join(map(repr, ROBOTS)))
     model: Literal["rotor", "lumped", "none"] = actuator_inertia  # pyright: ignore[reportAssignmentType]  # checked there
+    if period is not None:
+        number("period", period, 1e-6, 10.0, "1e-6 to 10 s")
     found = work_out(
         ROBOTS[robot],
         law,
@@ -50,6 +53,8 @@ def design(
         gains=json_object("gains", gains),
     )
     if figure is not None:
+        if not figure.name:
+            raise OptionError("figure", str(figure), "the path of a file, such as m_bar.svg")
         for one in found:
             drawing = draw(one).encode()
             write_atomically(_file(figure, one, len(found) > 1), lambda file, drawing=drawing: file.write(drawing))

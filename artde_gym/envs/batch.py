@@ -287,7 +287,7 @@ class BatchEnv(Counted, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
             self._table = SampledTable(self.num_envs)  # without the room that other disturbances have needed
         for i, realised in drawn.items():
             self._realised[i] = realised
-            self._table.enter(i, numeric(realised, self.words))
+        self._table.enter({i: numeric(realised, self.words) for i, realised in drawn.items()})
 
     def _info(self, mask: Mask, told: Columns) -> dict[str, Any]:
         """Tell of the environments in a mask what policies are not meant to see.

@@ -23,7 +23,6 @@ from artde_gym.envs.live import Live
 from artde_gym.envs.options import disturbances_in, warn_of_idle
 from artde_gym.envs.view import View
 from artde_gym.errors import OptionError
-from artde_gym.info import REWARD, count_events, flag_reason, prefixed
 from artde_gym.robots.ojas import model as robot
 from artde_gym.robots.ojas import task
 from artde_gym.robots.ojas.model import ActuatorInertia
@@ -252,14 +251,9 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
 
     def _info(self, terms: dict[str, float], falls: Sequence[bool], events: Sequence[str]) -> dict[str, Any]:
         """Tell what policies are not meant to see."""
-        return {
-            "time_s": self._k * self.control_period,
-            **prefixed(REWARD, terms),
-            "foot_loads": np.array(self._loads),
-            **self._sampled(),
-            **count_events(events),
-            **flag_reason(task.FALL_REASONS, falls),
-        }
+        info = self._told.told(self._k * self.control_period, terms, events, falls)
+        info["foot_loads"] = np.array(self._loads)
+        return info
 
     def _measure(self) -> Array:
         """Read the engine; returns the observation."""

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import abc
 import copy
-from collections.abc import Mapping
-from typing import Any, Self
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Self
 
 from artde_gym.disturbances.numeric import Words, numeric
 from artde_gym.disturbances.schedule import Push, Schedule
 from artde_gym.envs.closed import CLOSED, refuse
 from artde_gym.envs.counted import Counted
 from artde_gym.errors import RobotError
-from artde_gym.info import copied
+from artde_gym.info import EpisodeInfo
 from artde_gym.multibody.spec import RobotSpec, Vector
 from artde_gym.sim.engine import Engine
 
@@ -24,6 +24,7 @@ class Live(Counted, abc.ABC):
     _engine: Engine
     _realised: Mapping[str, Any]
     words: Words
+    fall_reasons: ClassVar[Sequence[str]]
 
     def __copy__(self) -> Self:
         return copy.deepcopy(self)  # two of them cannot share a world
@@ -64,11 +65,7 @@ class Live(Counted, abc.ABC):
         return copy.deepcopy(dict(self._realised))
 
     def _sample(self, realised: Mapping[str, Any]) -> None:
-        self._realised, self._numbers = realised, numeric(realised, self.words)
-
-    def _sampled(self) -> dict[str, Any]:
-        """The disturbances of this episode as `info` has them."""
-        return copied(self._numbers)
+        self._realised, self._told = realised, EpisodeInfo(numeric(realised, self.words), self.fall_reasons)
 
     def _require_open(self) -> None:
         refuse(closed=self._engine is CLOSED)

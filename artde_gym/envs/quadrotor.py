@@ -25,7 +25,6 @@ from artde_gym.envs.options import disturbances_in, warn_of_idle
 from artde_gym.envs.quadrotor_sensors import Measurement, Sensors
 from artde_gym.envs.view import View
 from artde_gym.errors import OptionError
-from artde_gym.info import REWARD, count_events, flag_reason, prefixed
 from artde_gym.multibody.spec import Vector
 from artde_gym.robots.q450 import model as robot
 from artde_gym.robots.q450 import task
@@ -220,13 +219,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
 
     def _info(self, terms: dict[str, float], falls: Sequence[bool], events: Sequence[str]) -> dict[str, Any]:
         """Tell what policies are not meant to see."""
-        return {
-            "time_s": self._k * self.control_period,
-            **prefixed(REWARD, terms),
-            **self._sampled(),
-            **count_events(events),
-            **flag_reason(task.FALL_REASONS, falls),
-        }
+        return self._told.told(self._k * self.control_period, terms, events, falls)
 
     def _simulate(self, command: list[float]) -> list[str]:
         """Let `command` act for one control period, with what disturbs it; returns what began or ended meanwhile."""

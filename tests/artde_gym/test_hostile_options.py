@@ -49,6 +49,7 @@ QUICK: dict[str, list[str]] = {
     "list": [],
     "benchmark": ["--quick", "--sections", "none"],
     "doctor": ["--checks", "none"],
+    "design": ["--robot", "quadrotor"],
 }  # fmt: skip
 """Arguments with which a command has next to nothing to do, or something to refuse at its end."""
 

@@ -105,7 +105,7 @@ def test_changes_that_are_not_committed_and_weights_trained_anew_are_other_softw
 
 def test_reproduction_refuses_too(tmp_path, monkeypatch):
     flight = dataclasses.replace(SCENARIOS["Q1-calm"], kwargs=FLIGHT)
-    monkeypatch.setitem(SCENARIOS, "Q1-calm", flight)
+    monkeypatch.setitem(SCENARIOS._entries, "Q1-calm", flight)
 
     def run(**options: Any) -> Any:
         return reproduce("quadrotor", tmp_path, scenarios=["Q1-calm"], controllers=["tde"], episodes=1, **options)

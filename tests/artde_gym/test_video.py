@@ -230,7 +230,8 @@ def test_command(tmp_path: Path) -> None:
 
 def test_gymnasium_records_at_the_pace_of_the_simulation(tmp_path: Path) -> None:
     pytest.importorskip("moviepy")
-    env = gym.make(WALK, disable_env_checker=True, render_mode="rgb_array", width=160, height=120, duration=0.5)
+    drawn: dict[str, Any] = {"render_mode": "rgb_array", "width": 160, "height": 120, "disturbances": {}}
+    env = gym.make(WALK, disable_env_checker=True, duration=0.5, control_period=0.01, **drawn)
     env = RecordVideo(env, str(tmp_path / "videos"))
     policy, state, over = controllers.make("tde", env), None, False
     observation, _ = env.reset(seed=0)

@@ -38,7 +38,7 @@ def training(env: str = QUADROTOR, base: str = "tde", **more: Any) -> Training:
     [
         ({"base": "nope"}, "controller is 'nope'"),
         ({"base": "tde+ppo", "options": {"n_steps": 8, "batch_size": 16}}, "base is 'tde[+]ppo'; allowed: a law"),
-        ({"env_kwargs": {**SHORT, "engine": "mujoco"}}, "argument of .* is 'engine'"),
+        ({"env_kwargs": {**SHORT, "engine": "mujoco"}}, "engine is 'mujoco'"),
         ({"env_kwargs": {**SHORT, "nope": 1}}, "argument of .* is 'nope'"),
         ({"env": BIPED, "env_kwargs": {**SHORT, "nope": 1}}, "argument of .* is 'nope'"),
         ({"env_kwargs": {**SHORT, "disturbances": {}}}, "disturbances have an argument of their own"),
