@@ -14,16 +14,20 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any, Literal, NamedTuple
 
 from artde_gym.registry import Registry
 from artde_gym.scenarios import Scenario
 
 Capability = Literal[
-    "actuators", "armature", "contact", "encoders", "feet", "flight", "joints", "legs", "mass", "payload", "rotors",
-    "sensors", "sites", "torque_limit",
+    "actuators", "armature", "contact", "effects", "encoders", "feet", "flight", "joints", "legs", "mass", "payload",
+    "rotors", "sensors", "sites", "torque_limit",
 ]  # fmt: skip
-"""Properties of a robot, and of its environments, that kinds of disturbances ask for."""
+"""Properties of a robot, and of its environments, that kinds of disturbances ask for.
+
+"effects" are those of registered kinds: the environments apply `artde_gym.disturbances.effects.Effects`.
+"""
 Harder = Literal["larger", "smaller"]
 
 
@@ -88,6 +92,20 @@ class Push(NamedTuple):
     force: float
 
 
+class Reported(NamedTuple):
+    """What a publication reports of a scenario.
+
+    Attributes:
+        table: where.
+        values: controller -> metric -> axis -> value.
+        time_to_fall: controller -> s.
+    """
+
+    table: str
+    values: Mapping[str, Mapping[str, Mapping[str, float]]]
+    time_to_fall: Mapping[str, float] = MappingProxyType({})
+
+
 def random_push(site: str, when: tuple[float, float]) -> dict[str, Any]:
     """Return a push to be varied in size: from any side with equal probability, at a random time (s) of a span."""
     return {
@@ -113,6 +131,7 @@ class RobotKit:
         defaults: "kind.parameter" -> default in place of the kind's own.
         scenarios: by which it is evaluated.
         reproduced: names of the scenarios that `reproduce` runs, and of the controllers in them.
+        reported: what a publication reports of its scenarios, by their name there (`Scenario.thesis`).
         frontier: its standard test; None if it has none.
         motion: that pictures in a report show.
         push: of live play; None to push at the first site with 10 N.
@@ -129,6 +148,7 @@ class RobotKit:
     defaults: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     scenarios: tuple[Scenario, ...] = ()
     reproduced: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
+    reported: Mapping[str, Reported] = dataclasses.field(default_factory=dict)
     frontier: FrontierTest | None = None
     motion: Motion = MOTION
     push: Push | None = None

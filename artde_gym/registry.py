@@ -3,12 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
+from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from artde_gym.errors import OptionError, UnknownNameError, among
 
 T = TypeVar("T")
+
+
+def pointed(group: str) -> dict[str, str]:
+    """Return what the entry points of a group name, "module:object" by name, without importing any of it.
+
+    The project's own come before others, in a fixed order.
+    """
+    return {point.name: point.value for point in _in_order(group)}
+
+
+def _in_order(group: str) -> list[EntryPoint]:
+    own = "artde-gym"
+    return sorted(entry_points(group=group), key=lambda p: (p.dist is None or p.dist.name != own, p.name))
 
 
 class Registry(Mapping[str, T], Generic[T]):
@@ -18,12 +32,19 @@ class Registry(Mapping[str, T], Generic[T]):
         noun: of an entry, for errors.
         group: of the entry points (of any installed distribution) that bring entries.
         unpack: turns one loaded entry point into entries by name; without, it is one entry, under its own name.
+        own: entries that are there from the beginning.
     """
 
-    def __init__(self, noun: str, group: str, unpack: Callable[[Any], Mapping[str, T]] | None = None) -> None:
+    def __init__(
+        self,
+        noun: str,
+        group: str,
+        unpack: Callable[[Any], Mapping[str, T]] | None = None,
+        own: Mapping[str, T] = MappingProxyType({}),
+    ) -> None:
         self.noun, self.group = noun, group
         self._unpack = unpack
-        self._entries: dict[str, T] = {}
+        self._entries: dict[str, T] = dict(own)
         self._loaded = False
 
     def register(self, name: str, entry: T, *, replace: bool = False) -> None:
@@ -63,8 +84,7 @@ class Registry(Mapping[str, T], Generic[T]):
         if self._loaded:
             return
         self._loaded = True  # first: what is loaded may look in here
-        points = entry_points(group=self.group)
-        for point in sorted(points, key=lambda p: (p.dist is None or p.dist.name != "artde-gym", p.name)):
+        for point in _in_order(self.group):
             loaded = point.load()
             for name, entry in ({point.name: loaded} if self._unpack is None else self._unpack(loaded)).items():
                 self._add(name, entry, replace=False)

@@ -15,7 +15,10 @@ REMEDY = "choose a smaller m_bar, or another actuator model"
 
 
 def validity() -> list[Outcome]:
-    """Every robot and actuator model, at the nominal inertias of the laws that need it."""
+    """Time-delay estimation converges: eigenvalues of M^-1 m_bar in (0, 2).
+
+    Every robot and actuator model, at the nominal inertias of the laws that need it.
+    """
     outcomes = [_biped(actuator) for actuator in get_args(ActuatorInertia)]
     return outcomes + [outcome for loop in loops("q450") for outcome in _quadrotor(loop)]
 

@@ -14,9 +14,10 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pybullet as bullet
+from artde_gym.robots.ojas.thesis import JOINTS
 
 import controllers
-from artde_gym.evaluation import Result, evaluate, statistics, thesis
+from artde_gym.evaluation import Result, evaluate, statistics
 from artde_gym.evaluation.rollout import run_episode
 from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.scenarios import SCENARIOS
@@ -42,8 +43,8 @@ def main() -> None:
 
 def errors(options: argparse.Namespace) -> None:
     """Means over the seeds, and by how many percent MuJoCo's is above Bullet's: over all joints, then q1 to q6."""
-    heading("scenario", "L (ms)", "controller", "falls", "Bullet (deg)", "MuJoCo (deg)", "all", *thesis.JOINTS)
-    columns = ("rmse_deg", *(f"rmse_deg_{joint}" for joint in thesis.JOINTS))
+    heading("scenario", "L (ms)", "controller", "falls", "Bullet (deg)", "MuJoCo (deg)", "all", *JOINTS)
+    columns = ("rmse_deg", *(f"rmse_deg_{joint}" for joint in JOINTS))
     for period in PERIODS:
         for scenario in options.scenarios or ("S1", "S2", "S3"):
             results = both(scenario, options, control_period=period)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from artde_gym.benchmark.figure import Section
 from artde_gym.errors import UnknownNameError, among
 from artde_gym.registration import resolved
+from artde_gym.registry import pointed
 
 SECTIONS: dict[str, str] = {
     "walk": "artde_gym.benchmark.walk:walking",
@@ -15,14 +16,13 @@ SECTIONS: dict[str, str] = {
     "herd": "artde_gym.benchmark.herd:herds",
     "reset": "artde_gym.benchmark.reset:resetting",
     "controllers": "artde_gym.benchmark.calls:calling",
-    "inference": "baselines.benchmark:inference",
-    "training": "baselines.benchmark:training",
     "scaling": "artde_gym.benchmark.scaling:scaling",
     "memory": "artde_gym.benchmark.memory:growing",
     "peers": "artde_gym.benchmark.peers:peers",
+    **pointed("artde_gym.benchmarks"),
 }
-"""Name -> "module:function", called as function(quick) and giving a `Section`; strings, so that a section may need what
-is not installed, or a package that this one may not import."""
+"""Name -> "module:function", called as function(quick) and giving a `Section`: our own, then those of the entry points
+"artde_gym.benchmarks". Strings, so that a section may need what is not installed."""
 
 
 def measure(

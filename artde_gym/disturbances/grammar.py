@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from artde_gym.disturbances.kinds import ALL, KINDS, NEVER, Kind, Parameter, allowed
+from artde_gym.disturbances.kinds import ALL, KINDS, NEVER, Kind, Parameter, allowed, in_order
 from artde_gym.errors import DisturbanceError, among
 
 DISTRIBUTIONS = ("uniform", "normal", "choice")
@@ -29,7 +29,7 @@ NORMAL_DRAWS = 1000  # then the mean, which is in range: a normal much wider tha
 class Disturbances:
     """Checked disturbances of one robot; build them with `parse`.
 
-    `entries` holds (kind, {parameter: value or distribution}) with all defaults filled in, in the order of `KINDS`,
+    `entries` holds (kind, {parameter: value or distribution}) with all defaults filled in, in a fixed order,
     so that the same seed draws the same values however the user ordered the keys.
     """
 
@@ -65,8 +65,8 @@ class Disturbances:
                 of_robot = f"{robot} honours " if name in KINDS else ""
                 raise DisturbanceError("disturbances", name, of_robot + among(name, honoured))
         entries: list[tuple[str, Mapping[str, Any]]] = []
-        for name, kind in KINDS.items():
-            if name in given:
+        for kind in in_order():
+            if (name := kind.name) in given:
                 for path, entry in _entries(kind, given[name]):
                     parsed = _parse_entry(kind, entry, path, {"site": sites, "joint": (*joints, ALL)}, robot)
                     entries += [(name, one) for one in _each_joint(parsed, joints)]

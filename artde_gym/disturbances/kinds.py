@@ -3,10 +3,54 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
+from artde_gym.arrays import Array
+from artde_gym.errors import OptionError
 from artde_gym.kit import ROBOTS, Capability
+from artde_gym.registry import Registry
+
+
+class RobotStates(NamedTuple):
+    """The states of n robots, as an effect sees them; of the base link's origin, in world axes.
+
+    Attributes:
+        time: since the start of each episode (n,) (s).
+        q, qd: of the actuated joints (n, joints) (rad, rad/s).
+        position, velocity: (n, 3) (m, m/s).
+        quat_xyzw: attitude of the base (n, 4).
+        angular_velocity: of the base (n, 3) (rad/s).
+    """
+
+    time: Array
+    q: Array
+    qd: Array
+    position: Array
+    quat_xyzw: Array
+    velocity: Array
+    angular_velocity: Array
+
+
+class Load(NamedTuple):
+    """Loads on n robots, beside those of actuators and ground; None for none.
+
+    Attributes:
+        tau: on the actuated joints (n, joints) (Nm).
+        force: at the center of mass of the base link (n, 3) (N), world axes.
+        torque: on the base link (n, 3) (Nm), world axes.
+    """
+
+    tau: Array | None = None
+    force: Array | None = None
+    torque: Array | None = None
+
+
+Effect = Callable[[Mapping[str, Array], RobotStates], Load]
+"""Computes what a disturbance does during the next physics step, from its sampled values and the states of n robots.
+
+A value is (n,), or (n, size); a word is its place among those allowed. The function is pure: no memory, no randomness.
+"""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,6 +87,7 @@ class Kind:
         scalar: the parameter that a bare number stands for.
         repeated: whether it takes a list of entries. Where it names a joint, "all" stands for one entry a joint.
         one_of: parameters of which exactly one is given; the others are absent.
+        effect: of a registered kind; environments act by themselves on those of this project.
     """
 
     name: str
@@ -52,6 +97,7 @@ class Kind:
     scalar: str | None = None
     repeated: bool = False
     one_of: tuple[str, ...] = ()
+    effect: Effect | None = None
 
     def default_of(self, parameter: Parameter, robot: str | None) -> Any:
         """Return a parameter's default for a robot, or for none in particular."""
@@ -60,7 +106,8 @@ class Kind:
 
     def honored_by(self, robot: str | None) -> bool:
         """Return whether a robot has what this takes; any kind may be read for no robot in particular."""
-        return robot is None or self.requires in ROBOTS[robot].capabilities
+        needed = {self.requires} if self.effect is None else {self.requires, "effects"}
+        return robot is None or needed <= ROBOTS[robot].capabilities
 
 
 ALL = "all"
@@ -77,7 +124,7 @@ def _time(name: str, default: float | None, text: str) -> Parameter:
     return Parameter(name, "s", 0.0, NEVER, default, text)
 
 
-KINDS: dict[str, Kind] = {
+OWN: dict[str, Kind] = {
     kind.name: kind
     for kind in (
         Kind(
@@ -316,6 +363,50 @@ KINDS: dict[str, Kind] = {
         ),
     )
 }
+"""The kinds of this project by name."""
+
+KINDS: Registry[Kind] = Registry(
+    "disturbance", "artde_gym.disturbances", lambda loaded: {kind.name: kind for kind in kinds_of(loaded)}, OWN
+)
+"""All kinds by name: those of this project, of plug-ins, and those registered."""
+
+
+def register_disturbance(kind: Kind, effect: Effect, *, replace: bool = False) -> None:
+    """Make a kind of disturbance known to the grammar, to environments and to the command line.
+
+    Environments of robots that have its capability, and "effects", apply it from the first step of an episode on.
+
+    Args:
+        kind: its name and parameters.
+        effect: computes what it does to n robots.
+        replace: whether it may take the place of one of the same name.
+
+    Raises:
+        OptionError: if its name is taken and `replace` is not given, or is one of this project's.
+    """
+    if kind.name in OWN:
+        raise OptionError("disturbance", kind.name, f"a new name; these are taken: {', '.join(OWN)}")
+    KINDS.register(kind.name, dataclasses.replace(kind, effect=effect), replace=replace)
+
+
+def kinds_of(loaded: Any) -> tuple[Kind, ...]:
+    """Check what an entry point of the group `artde_gym.disturbances` has brought: a kind with an effect, or several.
+
+    Raises:
+        OptionError: if it is anything else.
+    """
+    kinds = loaded if isinstance(loaded, tuple) else (loaded,)
+    for kind in kinds:
+        if not (isinstance(kind, Kind) and kind.effect is not None):
+            raise OptionError(
+                "entry point of artde_gym.disturbances", kind, "a Kind with an effect, or a tuple of them"
+            )
+    return kinds
+
+
+def in_order() -> list[Kind]:
+    """Return all kinds in the order in which their values are drawn, which is not that of their registration."""
+    return [*OWN.values(), *(KINDS[name] for name in sorted(KINDS.keys() - OWN.keys()))]
 
 
 INTRODUCTION = """\

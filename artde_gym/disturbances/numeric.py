@@ -23,19 +23,20 @@ def numeric(sampled: Mapping[str, Any], words: Words) -> dict[str, Any]:
     """Name each number, words being replaced by numbers and lists of entries by arrays."""
     told: dict[str, Any] = {}
     for kind, value in sampled.items():
-        absent = [name for name in KINDS[kind].one_of if name not in value]
+        entries = value if KINDS[kind].repeated else (value,)
         for parameter in KINDS[kind].parameters:
-            if parameter.name in absent:
-                continue
+            if not all(parameter.name in entry for entry in entries):
+                continue  # one of several of which only one is given
             told[f"disturbance.{kind}.{parameter.name}"] = (
-                np.array([_number(parameter, entry[parameter.name], words) for entry in value])
+                np.array([number_of(parameter, entry[parameter.name], words) for entry in value])
                 if KINDS[kind].repeated
-                else _number(parameter, value[parameter.name], words)
+                else number_of(parameter, value[parameter.name], words)
             )
     return told
 
 
-def _number(parameter: Parameter, value: Any, words: Words) -> Any:
+def number_of(parameter: Parameter, value: Any, words: Words) -> Any:
+    """Return a sampled value as a number or an array; a word is its place among those allowed."""
     if parameter.size == 0:
         known = words[parameter.words] if isinstance(parameter.words, str) else parameter.words
         return list(known).index(value)

@@ -16,7 +16,7 @@ from gymnasium.utils.env_checker import check_env
 import artde_gym  # noqa: F401  # registers the environments
 from artde_gym.doctor.outcome import Outcome
 from artde_gym.evaluation.environments import ours, vector
-from artde_gym.sim.factory import missing_bullet, resolve_engine
+from artde_gym.sim.factory import ENGINES, resolve_engine
 
 ARGUMENTS: dict[str, Any] = {"duration": 3.0, "disturbances": {"payload": 0.3}}
 IN_SI_UNITS = r".*(symmetric and normalized|recommend using np.float32)"
@@ -24,16 +24,12 @@ IN_SI_UNITS = r".*(symmetric and normalized|recommend using np.float32)"
 REMEDY = "pip install -c constraints.txt --force-reinstall . : the tests pass with these versions"
 
 
-def bullet() -> list[Outcome]:
-    """Run Gymnasium's checker on every environment in PyBullet, where it is there."""
-    if missing := missing_bullet():
-        return [Outcome("PyBullet", "missing", "the default engine is MuJoCo", missing)]
-    return [_checked(name, "bullet", _gymnasium) for name in ours()]
-
-
-def mujoco() -> list[Outcome]:
-    """Run Gymnasium's checker on every environment in MuJoCo."""
-    return [_checked(name, "mujoco", _gymnasium) for name in ours()]
+def in_engine(name: str) -> list[Outcome]:
+    """Run Gymnasium's checker on every environment in an engine, where it is there."""
+    if missing := ENGINES[name].missing():
+        default = ENGINES[resolve_engine(None)].title
+        return [Outcome(ENGINES[name].title, "missing", f"the default engine is {default}", missing)]
+    return [_checked(env_id, name, _gymnasium) for env_id in ours()]
 
 
 def stable_baselines3() -> list[Outcome]:

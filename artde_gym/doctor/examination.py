@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import inspect
 import multiprocessing
 import os
 import traceback
@@ -13,24 +14,37 @@ from typing import Any, NamedTuple
 from artde_gym.doctor.outcome import Outcome
 from artde_gym.errors import UnknownNameError, among
 from artde_gym.registration import resolved
+from artde_gym.registry import pointed
+from artde_gym.sim.factory import ENGINES
 
-CHECKS: dict[str, tuple[str, str]] = {
-    "python": ("Python and packages", "artde_gym.doctor.machine:python"),
-    "extras": ("Optional packages", "artde_gym.doctor.machine:extras"),
-    "files": ("Files", "artde_gym.doctor.machine:files"),
-    "bullet": ("Environments in PyBullet", "artde_gym.doctor.environments:bullet"),
-    "mujoco": ("Environments in MuJoCo", "artde_gym.doctor.environments:mujoco"),
-    "batch": ("Many environments at once", "artde_gym.doctor.environments:batch"),
-    "sb3": ("Stable-Baselines3", "artde_gym.doctor.environments:stable_baselines3"),
-    "determinism": ("Determinism", "artde_gym.doctor.determinism:determinism"),
-    "validity": (
-        "Time-delay estimation converges: eigenvalues of M^-1 m_bar in (0, 2)",
-        "controllers.checkup:validity",
-    ),
-    "speed": ("Speed", "artde_gym.doctor.speed:speed"),
-    "pictures": ("Pictures and videos", "artde_gym.doctor.pictures:pictures"),
+
+class Check(NamedTuple):
+    """A check: `entry_point` is "module:function", called with `arguments` and giving a list of `Outcome`s.
+
+    Without a title, it is the first line of the function's docstring.
+    """
+
+    title: str
+    entry_point: str
+    arguments: tuple[str, ...] = ()
+
+
+CHECKS: dict[str, Check] = {
+    "python": Check("Python and packages", "artde_gym.doctor.machine:python"),
+    "extras": Check("Optional packages", "artde_gym.doctor.machine:extras"),
+    "files": Check("Files", "artde_gym.doctor.machine:files"),
+    **{
+        name: Check(f"Environments in {engine.title}", "artde_gym.doctor.environments:in_engine", (name,))
+        for name, engine in ENGINES.items()
+    },
+    "batch": Check("Many environments at once", "artde_gym.doctor.environments:batch"),
+    "sb3": Check("Stable-Baselines3", "artde_gym.doctor.environments:stable_baselines3"),
+    "determinism": Check("Determinism", "artde_gym.doctor.determinism:determinism"),
+    "speed": Check("Speed", "artde_gym.doctor.speed:speed"),
+    "pictures": Check("Pictures and videos", "artde_gym.doctor.pictures:pictures"),
+    **{name: Check("", point) for name, point in pointed("artde_gym.checks").items()},
 }
-"""Name -> (title, "module:function"), called as function() and giving a list of `Outcome`s."""
+"""All checks by name: our own, then those of the entry points "artde_gym.checks", which no other process imports."""
 
 PATIENCE = 180.0
 """Seconds after which a check is given up."""
@@ -59,45 +73,56 @@ def examine(names: Sequence[str] | None = None, *, workers: int | None = None) -
         if name not in CHECKS:
             raise UnknownNameError("check", name, among(name, CHECKS))
     with ThreadPoolExecutor(workers or os.cpu_count() or 1) as pool:
-        running = {name: pool.submit(_isolated, *CHECKS[name]) for name in chosen}
+        running = {name: pool.submit(_isolated, name, CHECKS[name]) for name in chosen}
         for name, future in running.items():
-            yield name, Report(CHECKS[name][0], future.result())
+            yield name, future.result()
 
 
-def _isolated(title: str, entry_point: str) -> list[Outcome]:
+def _isolated(name: str, check: Check) -> Report:
     """What a check in a process of its own finds; its crash is a finding."""
     context = multiprocessing.get_context("spawn")  # a fork would copy threads and locks
     ours, theirs = context.Pipe(duplex=False)
-    process = context.Process(target=_run, args=(entry_point, theirs))
+    process = context.Process(target=_run, args=(check, theirs))
     process.start()
     theirs.close()
-    found: list[Outcome] | None = None
+    found: Report | None = None
     late = not ours.poll(PATIENCE)
     if late:
         process.kill()
     else:
         with contextlib.suppress(EOFError):  # it died without a word
-            found = [Outcome(*values) for values in ours.recv()]
+            title, outcomes = ours.recv()
+            found = Report(title or name, [Outcome(*values) for values in outcomes])
     process.join()
     if found is not None:
         return found
+    said, remedy = f"the process died with exit code {process.exitcode}", REPORT_IT
     if late:
-        return [Outcome(title, "failed", f"no answer in {PATIENCE:g} s", "end other programs and try again")]
-    return [Outcome(title, "failed", f"the process died with exit code {process.exitcode}", REPORT_IT)]
+        said, remedy = f"no answer in {PATIENCE:g} s", "end other programs and try again"
+    title = check.title or name
+    return Report(title, [Outcome(title, "failed", said, remedy)])
 
 
-def _run(entry_point: str, channel: Any) -> None:
+def _run(check: Check, channel: Any) -> None:
     sink = os.open(os.devnull, os.O_WRONLY)
     os.dup2(sink, 1)  # whatever libraries have to say
     os.dup2(sink, 2)
-    channel.send([tuple(outcome) for outcome in _attempted(entry_point)])
+    outcomes = [tuple(outcome) for outcome in _attempted(check)]
+    channel.send((check.title or _title_of(check), outcomes))
     channel.close()
 
 
-def _attempted(entry_point: str) -> list[Outcome]:
+def _title_of(check: Check) -> str:
+    """Return the first line of a function's docstring; "" without one."""
+    with contextlib.suppress(Exception):  # what was wrong with it has been found
+        return (inspect.getdoc(resolved(check.entry_point)) or "").split("\n")[0].rstrip(".")
+    return ""
+
+
+def _attempted(check: Check) -> list[Outcome]:
     """What a check finds, an exception being a finding."""
     try:
-        return resolved(entry_point)()
+        return resolved(check.entry_point)(*check.arguments)
     except Exception as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
         found = f"{type(error).__name__}: {error} ({os.path.basename(place.filename)}:{place.lineno})"

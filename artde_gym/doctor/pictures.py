@@ -16,13 +16,15 @@ import gymnasium as gym
 import artde_gym  # noqa: F401  # registers the environments
 from artde_gym.doctor.outcome import Outcome
 from artde_gym.errors import MissingDependencyError, OptionError
+from artde_gym.sim.factory import ENGINES
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
 def pictures() -> list[Outcome]:
     """Each of them by itself."""
-    return [_picture("bullet", "PyBullet"), _picture("mujoco", "MuJoCo"), _display(), _ffmpeg(), _browser()]
+    drawn = [_picture(name, engine.title) for name, engine in ENGINES.items()]
+    return [*drawn, _display(), _ffmpeg(), _browser()]
 
 
 def _picture(engine: str, written: str) -> Outcome:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from artde_gym.arguments import action_array, known_arguments, seed_number
 from artde_gym.arrays import Array, total
+from artde_gym.disturbances.effects import Effects
 from artde_gym.disturbances.ground import LOADED, GrfPulses
 from artde_gym.disturbances.schedule import Schedule
 from artde_gym.envs.biped_course import Course
@@ -133,6 +134,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         warn_of_idle(self._disturbances, self._last * self.control_period)
         self._course = Course(self._realised, walk, self.np_random)
         self._pulses: GrfPulses | None = None
+        self._effects = Effects(1, self.words)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
         """Start a walk; `options` are those of the class' documentation.
@@ -215,6 +217,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         if "grf_pulse" in realised:
             self._pulses = self._walk.pulses(1)
             self._pulses.begin(0, realised["grf_pulse"], self.nominal_robot)
+        self._effects.begin(0, realised)
         steps = task.settling(realised)
         tau = self._settle(self._walk.pose(realised), steps) if steps else self._still
         self._course.settled(tau)
@@ -233,13 +236,15 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         """Let `command` act for one control period, with what disturbs it; returns what began or ended meanwhile."""
         engine, course = self._engine, self._course
         events: list[str] = []
-        first = self.elapsed
+        first, affected = self.elapsed, self._effects.acting[0]
         course.begin(command)
         for step in range(first, first + self._walk.substeps):
             tau = course.act(step, engine, events)
             if self._pulses is not None:
                 loads = np.array([engine.foot_loads()])
                 engine.lift_feet(self._pulses.forces(loads, np.array([step]))[0].tolist())
+            if affected:
+                tau = tau + self._effects.act(engine, engine.read(), step * task.TIME_STEP)
             engine.step(tau)
         self._tau = course.applied()
         return events

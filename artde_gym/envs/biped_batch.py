@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from artde_gym.arguments import known_arguments
 from artde_gym.arrays import Array, each
 from artde_gym.disturbances import Disturbances
+from artde_gym.disturbances.effects import Effects, load_base
 from artde_gym.disturbances.ground import LOADED, GrfPulses
+from artde_gym.disturbances.kinds import RobotStates
 from artde_gym.disturbances.schedule import NEVER
 from artde_gym.disturbances.sensing import Sensing
 from artde_gym.envs.batch import BatchEnv, Mask
@@ -128,6 +130,7 @@ class BipedVectorEnv(BatchEnv):
         self._wakes = np.full(num_envs, NEVER)  # time step of each walk in which its course is to be asked again
         self._pulses: GrfPulses | None = None
         self._pulsed = np.zeros(num_envs, np.bool_)  # robots with ground reaction pulses
+        self._effects = Effects(num_envs, self.words)
         self._sensing: dict[int, Sensing] = {}  # where sensors err
         self._readings: dict[int, Array] = {}  # what they measured last
         self._tau = self._previous = np.zeros((num_envs, task.N_JOINTS))
@@ -154,6 +157,7 @@ class BipedVectorEnv(BatchEnv):
             course = self._courses[i] = Course(realised, walk, self._np_random[i])
             course.start(batch.worlds[i])
             self._begin_pulses(i, realised.get("grf_pulse"))
+            self._effects.begin(i, realised)
             self._wakes[i] = course.wakes(0)
             self._sensing.pop(i, None)
             if course.sensing is not None:
@@ -188,7 +192,7 @@ class BipedVectorEnv(BatchEnv):
         self._previous, self._tau = self._tau, commands
         steps = self._walk.substeps
         awake = goes_on & (self._wakes < (self._k + 1) * steps)
-        busy = awake | (goes_on & self._pulsed)
+        busy = awake | (goes_on & (self._pulsed | self._effects.acting))
         if not busy.any():
             self._step(commands, goes_on, steps)
             return {}
@@ -212,11 +216,32 @@ class BipedVectorEnv(BatchEnv):
             if self._pulses is not None:
                 forces = self._pulses.forces(self._batch.foot_loads(), self._k * steps + step)
                 self._batch.lift_feet(forces * some[:, None])
-            self._step(torques, some, 1)
+            self._step(self._affected(torques, some, step), some, 1)
         for i, course, first in happening:
             commands[i] = course.applied()
             self._wakes[i] = course.wakes(first + steps)
         return {i: words for i, words in events.items() if words}
+
+    def _affected(self, torques: Array, some: Mask, step: int) -> Array:
+        """Load the bases of `some` robots by their effects; returns torques with those of the effects added."""
+        acting = some & self._effects.acting
+        if not acting.any():
+            return torques
+        load = self._effects.load(self._states(self._k * self._walk.substeps + step))
+        for i in np.flatnonzero(acting).tolist():
+            load_base(self._batch.worlds[i], load, i)
+        if load.tau is not None:
+            torques = torques.copy()
+            torques[acting] += load.tau[acting]
+        return torques
+
+    def _states(self, steps: NDArray[np.int64]) -> RobotStates:
+        """The states of all robots, after so many time steps (n,) of each."""
+        with np.errstate(invalid="ignore", over="ignore"):  # of a robot that has diverged
+            state = self._batch.read()
+        of_base = (state.position, state.quat_xyzw, state.velocity, state.angular_velocity)
+        base = (np.stack(parts, axis=1) for parts in of_base)
+        return RobotStates(steps * task.TIME_STEP, state.q, state.qd, *base)
 
     def _step(self, torques: Array, some: Mask, steps: int) -> None:
         """Advance some robots by so many time steps under their rows of `torques`."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from artde_gym.arguments import action_array, known_arguments, seed_number, steps_per_period
 from artde_gym.arrays import Array, total
+from artde_gym.disturbances.effects import Effects, load_base
 from artde_gym.disturbances.ground_effect import thrust_gain
 from artde_gym.disturbances.noise import draw_keys
 from artde_gym.disturbances.schedule import Schedule
@@ -130,6 +131,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self._placed = self._engine.snapshot()
         self._k, self._over = 0, True  # no step before the first reset
         self._schedule = Schedule({}, TIME_STEP)
+        self._effects = Effects(1, self.words)
         self._sample({})
         warn_of_idle(self._disturbances, self._last * self.control_period)
 
@@ -210,6 +212,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self._wind = Wind(realised["wind"], keys[0]) if "wind" in realised else None
         self._ground_effect = realised.get("ground_effect", {}).get("strength", 0.0)
         self._sensors.begin(0, realised, keys[1:])
+        self._effects.begin(0, realised)
         self._k = 0
         self._over = False
         self._read()
@@ -232,11 +235,13 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
             if self._ground_effect:
                 rows[start:end] = ((thrusts[start:end] * self._gains()) @ robot.MIXER.T).tolist()
             drag_x, drag_y, drag_z = self._drag()
+            load = self._effects.load_of(self._state, (first + start) * TIME_STEP)
             for step in range(start, end):
                 if not quiet:
                     events += self._schedule.apply(first + step, engine)
                 u1, u2, u3, u4 = rows[step]
                 engine.push_base((drag_x, drag_y, drag_z + u1), (u2, u3, u4))
+                load_base(engine, load, 0)
                 engine.step(_NO_JOINTS)
             self._read()
         self._wrench = np.add.reduce(wrenches) / steps

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from artde_gym.arrays import Array
+from artde_gym.disturbances.effects import Effects
 from artde_gym.disturbances.ground_effect import thrust_gain
-from artde_gym.disturbances.kinds import KINDS
+from artde_gym.disturbances.kinds import OWN, RobotStates
 from artde_gym.disturbances.noise import uniform_noise
 from artde_gym.disturbances.schedule import ATTACHED, DROPPED, NEVER, PUSH_BEGINS, PUSH_ENDS, Push
 from artde_gym.disturbances.wind import GRID, Air, advance, air, processes, velocity
@@ -23,11 +24,11 @@ from artde_gym.multibody.lag import follow, lag_shares
 from artde_gym.robots.q450 import model as robot
 from artde_gym.robots.q450 import task
 from artde_gym.sim.engine import PAYLOAD_RADIUS
-from artde_gym.sim.rigid_bodies import MassProperties, RigidBodies, composite, cross, transposed_times
+from artde_gym.sim.rigid_bodies import MassProperties, RigidBodies, composite, cross, times, transposed_times
 
 FINE = 0.001  # s, resolution of pushes
 PARTS = round(GRID / FINE)
-SLOTS = int(KINDS["torque_delay"].parameters[0].high) + 1  # commands that a delay has to remember
+SLOTS = int(OWN["torque_delay"].parameters[0].high) + 1  # commands that a delay has to remember
 
 _SITES = {name: place for name, _, place in robot.q450().sites}
 
@@ -74,11 +75,13 @@ class Fleet:
         self._ground_effect = np.zeros(n, dtype)
         self._pushes = np.zeros((0, 3, n), dtype)  # forces that act (N, world axes)
         self._places = np.zeros((0, 3, n), dtype)  # where (m, body axes)
+        self._effects = Effects(n, task.WORDS)
 
     def begin(self, vehicle: int, realised: Mapping[str, Any], key: np.uint64) -> None:
         """Begin an episode of one vehicle, at rest in balance, with realised disturbances and the key of its wind."""
         self._begun[vehicle] = self._step
         self._begin_rotors(vehicle, realised)
+        self._effects.begin(vehicle, realised)
         wind = realised.get("wind")
         self._air[:, vehicle] = air(wind)
         self._keep[:, vehicle], self._kick[:, vehicle] = processes(wind)
@@ -141,7 +144,7 @@ class Fleet:
             u1, *torques = robot.wrench(*(mean * self._gains(origin[2])))
             force = bodies.rot[:, 2] * u1
             force += robot.DRAG * (wind - bodies.origin_velocity())
-            bodies.kick(GRID, *self._pushed(force, np.stack(torques)))
+            bodies.kick(GRID, *self._loaded(*self._pushed(force, np.stack(torques)), origin))
             self._step += 1
         bodies.drift(0.5 * GRID)
         self.wrenches = np.stack(robot.wrench(*(total / self._steps)))
@@ -198,6 +201,23 @@ class Fleet:
                 np.add(force, push, out=force, where=acts)
                 np.add(torque, cross(place, transposed_times(self.bodies.rot, push)), out=torque, where=acts)
         return force, torque
+
+    def _loaded(self, force: Array, torque: Array, origin: Array) -> tuple[Array, Array]:
+        """Force and torque with those of effects."""
+        if self._effects.acting.any():
+            load = self._effects.load(self._states(origin))
+            if load.force is not None:
+                force += load.force.T
+            if load.torque is not None:
+                torque += transposed_times(self.bodies.rot, load.torque.T)
+        return force, torque
+
+    def _states(self, origin: Array) -> RobotStates:
+        """The states of all vehicles now, whose origins are known; they have no joints."""
+        bodies, joints = self.bodies, np.zeros((origin.shape[1], 0))
+        spin = times(bodies.rot, bodies.rates)
+        parts = (np.ascontiguousarray(part.T) for part in (origin, bodies.quat_xyzw, bodies.origin_velocity(), spin))
+        return RobotStates((self._step - self._begun) * GRID, joints, joints, *parts)
 
     def _push_events(self, vehicle: int, realised: Mapping[str, Any]) -> list[_Event]:
         """Pushes act for the share of a step that they cover."""

@@ -2,9 +2,10 @@
 
 from artde_gym.deprecation import moved
 from artde_gym.evaluation.evaluate import evaluate
+from artde_gym.evaluation.registered import Metric, register_metric
 from artde_gym.evaluation.result import Result
 
-__all__ = ["Result", "evaluate"]
+__all__ = ["Metric", "Result", "evaluate", "register_metric"]
 
 _STUDIES = ("Frontier", "Reproduction", "Sweep", "Tuning", "frontier", "read_sweep", "reproduce", "sweep", "tune")
 _SCENARIOS = ("SCENARIOS", "Scenario", "scenario")

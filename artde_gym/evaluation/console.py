@@ -15,12 +15,14 @@ from rich.text import Text
 
 from artde_gym.evaluation import statistics, thesis
 from artde_gym.evaluation.environments import tracking_of
+from artde_gym.evaluation.registered import METRICS
 from artde_gym.evaluation.result import Result
 from artde_gym.scenarios import SCENARIOS
 from artde_gym.tracking import Tracking
 
 UNITS = {"deg": ("deg", 3), "m": ("m", 4), "nm": ("Nm", 3), "n": ("N", 3)}
 """Unit in a column's name -> how it is written, and with how many digits."""
+DIGITS = 4  # of a metric of another unit
 REFERENCE = "artde"
 """The controller that all others are compared with, if it was evaluated: the claims are about this one."""
 ALL = "all"  # axes together
@@ -90,11 +92,12 @@ class _Tables:
         rows = [self._result.rows(scenario, controller) for controller in self._controllers]
         count = max(map(len, rows))
         note = f"{count} seeded episode{'s' if count > 1 else ''} a controller; mean, change with its 95 % interval"
-        if reference in thesis.TABLES:
-            note += f"; thesis: {thesis.TABLES[reference]}"
+        if table := thesis.reported(reference).table:
+            note += f"; thesis: {table}"
         parts: list[RenderableType] = [title, Text(note, style="dim"), self._falls(scenario, reference)]
         tracking = tracking_of(pd.concat(rows)["env"].iloc[0])
-        for metric, what, axes in measured(tracking, () if entry is None else entry.phases):
+        own = [name for name in METRICS if name in self._result.metrics]
+        for metric, what, axes in measured(tracking, () if entry is None else entry.phases, own):
             parts += self._metric(scenario, reference, metric, what, axes)
         return Group(*parts, *self._events(scenario, tracking))
 
@@ -115,7 +118,7 @@ class _Tables:
 
     def _metric(self, scenario: str, reference: str | None, metric: str, title: str, axes: list[str]) -> list[Table]:
         """Two rows an axis, ours and the thesis'. Few controllers and their comparisons share one table."""
-        digits = next(digits for unit, (_, digits) in UNITS.items() if unit in metric.split("_"))
+        digits = digits_of(metric)
 
         def column(axis: str) -> str:
             return metric if axis == ALL else f"{metric}_{axis}"
@@ -169,8 +172,14 @@ class _Tables:
         return [table] if table.row_count else []
 
 
-def measured(tracking: Tracking, phases: Sequence[tuple[float, float]]) -> list[tuple[str, str, list[str]]]:
-    """Metrics to show, their titles and axes: each phase by itself where the scenario has phases."""
+def measured(
+    tracking: Tracking, phases: Sequence[tuple[float, float]], registered: Sequence[str] = ()
+) -> list[tuple[str, str, list[str]]]:
+    """Metrics to show, their titles and axes: each phase by itself where the scenario has phases.
+
+    `registered` are names of `artde_gym.evaluation.registered`, which come last and are of a whole episode.
+    """
+    own = [(name, name, [ALL]) for name in registered]
     metrics = [
         (f"{metric}_{tracked.unit}", f"{text} ({UNITS[tracked.unit][0]})", list(tracked.axes))
         for metric, text in (("rmse", "RMS error"), ("max_abs_error", "maximum absolute error"))
@@ -182,12 +191,17 @@ def measured(tracking: Tracking, phases: Sequence[tuple[float, float]]) -> list[
     ]
     if not phases:
         main, *others = metrics
-        return [(*main[:2], [*main[2], ALL]), *others]
+        return [(*main[:2], [*main[2], ALL]), *others, *own]
     return [
         (f"{metric}_phase{number}", f"{title}, {_part(*phase)}", axes)
         for metric, title, axes in metrics
         for number, phase in enumerate(phases, start=1)
-    ]
+    ] + own
+
+
+def digits_of(metric: str) -> int:
+    """Return the digits with which a metric is written, by the unit in its name."""
+    return next((digits for unit, (_, digits) in UNITS.items() if unit in metric.split("_")), DIGITS)
 
 
 def _part(start: float, end: float) -> str:

@@ -74,7 +74,8 @@ def with_engine(env_id: str, kwargs: Mapping[str, Any], backend: Backend = "sing
 
 def physics_of(kwargs: Mapping[str, Any]) -> str:
     """Say in which physics an environment with arguments of `with_engine` runs."""
-    return ENGINES.get(kwargs["engine"], str(kwargs["engine"])) if "engine" in kwargs else "NumPy"
+    name = kwargs.get("engine", "NumPy")
+    return ENGINES[name].title if name in ENGINES else str(name)
 
 
 def ours() -> list[str]:

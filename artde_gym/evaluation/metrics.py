@@ -20,6 +20,7 @@ Per axis: `rmse_u_<axis>`, `max_abs_error_u_<axis>`, and for each effort `rms_<e
   in its band, or below its largest value in the 2 s before if that is more; infinite if it never does, as in a fall
   after the event's beginning. NaN where the episode ended too early to tell: before the event, less than 1 s after it,
   or with an error that had stayed there for less than 1 s.
+- those of `artde_gym.evaluation.registered`, by name.
 """
 
 from __future__ import annotations
@@ -32,6 +33,8 @@ from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
 from artde_gym.disturbances.kinds import NEVER
+from artde_gym.errors import OptionError
+from artde_gym.evaluation.registered import METRICS, Metric
 from artde_gym.layout import Layout
 from artde_gym.tracking import Fields, Tracked, Tracking
 
@@ -109,6 +112,7 @@ class Metrics:
         names = dict.fromkeys(name for one in events for name in one)
         never = (np.inf, np.inf)
         self._events = {name: _Event([one.get(name, never) for one in events], tracking.band, period) for name in names}
+        self._registered = [_Registered(metric, n) for metric in METRICS.values()]
         self._count = np.zeros(n, dtype=np.int64)  # samples of each episode so far
 
     def add(self, start: int, fields: Fields, diagnostics: Fields | None, live: Mask | None = None) -> None:
@@ -153,6 +157,8 @@ class Metrics:
         for column, name in tracking.means.items():
             if diagnostics is not None and name in diagnostics:
                 self._means[column].add(diagnostics[name], live)
+        for registered in self._registered:
+            registered.add(fields, diagnostics or {}, live)
 
     def _mass(self, start: int, samples: int) -> Array:
         """Mass of the robot with what it carries (kg), (samples, n)."""
@@ -201,6 +207,10 @@ class Metrics:
             columns["cost_of_transport"] = energy / (GRAVITY * carried)
         columns |= {column: squares.rms_of_all for column, squares in self._sigmas.items()}
         columns |= {column: mean.value for column, mean in self._means.items()}
+        for registered in self._registered:
+            if registered.name in columns:
+                raise OptionError("name of a metric", registered.name, "a name that no other column has")
+            columns[registered.name] = registered.value
         return [
             dict(zip(columns, row, strict=True))
             for row in zip(*(values.tolist() for values in columns.values()), strict=True)
@@ -252,6 +262,40 @@ class _Mean:
     @property
     def value(self) -> Array:
         return self._sums / _or_nan(self._number)
+
+
+class _Registered:
+    """A registered metric in n episodes."""
+
+    def __init__(self, metric: Metric, n: int) -> None:
+        self.name, self._signal = metric.name, metric.signal
+        self._rms, self._sign = metric.reduction == "rms", -1.0 if metric.reduction == "min" else 1.0
+        self._extreme = metric.reduction in ("max", "min")
+        self._mean, self._largest = _Mean(n), np.full(n, np.nan)
+
+    def add(self, fields: Fields, diagnostics: Fields, live: Mask | None) -> None:
+        """Take in a block of samples.
+
+        Raises:
+            OptionError: if the signal is none of n episodes.
+        """
+        given = self._signal(fields, diagnostics)
+        if given is None:
+            return
+        values = np.asarray(given, dtype=np.float64)
+        if values.ndim != 2 or values.shape[1] != len(self._largest):
+            raise OptionError(f"shape of metric {self.name!r}", values.shape, f"(samples, {len(self._largest)})")
+        if self._extreme:
+            self._largest = np.fmax(self._largest, _largest(self._sign * values, live))
+        else:
+            self._mean.add(np.square(values) if self._rms else values, live)
+
+    @property
+    def value(self) -> Array:
+        """(n,), NaN where there was no sample."""
+        if self._extreme:
+            return self._sign * self._largest
+        return np.sqrt(self._mean.value) if self._rms else self._mean.value
 
 
 class _Variation:

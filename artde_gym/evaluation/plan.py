@@ -21,6 +21,7 @@ from artde_gym.evaluation.gains import checked_gains, policy_for
 from artde_gym.evaluation.identity import Identity, behind, identity_of
 from artde_gym.evaluation.labels import named_controllers
 from artde_gym.evaluation.provenance import provenance
+from artde_gym.evaluation.registered import METRICS
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.evaluation.tasks import Case, Task, tasks_of
 from artde_gym.evaluation.workers import check_picklable, check_workers
@@ -125,6 +126,7 @@ class Plan:
             "backend": self.backend,
             "traced": self.traces,
             "trace_hz": self.trace_hz if math.isfinite(self.trace_hz) else "all",
+            **({"metrics": sorted(METRICS)} if METRICS else {}),
         }
 
     def provenance(self, evidence: Mapping[str, str]) -> dict[str, Any]:

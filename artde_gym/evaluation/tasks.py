@@ -10,6 +10,7 @@ from artde_gym.evaluation.batch import run_batch
 from artde_gym.evaluation.cells import Cell, single_of, vector_of
 from artde_gym.evaluation.environments import Backend
 from artde_gym.evaluation.gains import policy_for
+from artde_gym.evaluation.registered import METRICS, require_metrics
 from artde_gym.evaluation.rollout import Episode, Policy, run_episode
 from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.registration import ControllerSpec
@@ -29,7 +30,10 @@ class Case(NamedTuple):
 
 
 class Task(NamedTuple):
-    """Episodes of one controller that run at once: a single one, or a chunk. The first `traced` leave traces."""
+    """Episodes of one controller that run at once: a single one, or a chunk. The first `traced` leave traces.
+
+    `metrics` are the registered ones that the process must know.
+    """
 
     backend: Backend
     cell: Cell
@@ -40,6 +44,7 @@ class Task(NamedTuple):
     seeds: list[int]
     trace_hz: float
     traced: int
+    metrics: tuple[str, ...] = ()
 
 
 class Update(NamedTuple):
@@ -110,7 +115,9 @@ def task_of(case: Case, episodes: Iterable[int], backend: Backend, *, traced: in
     numbers = list(episodes)
     seeds = [episode_seed(case.seed, episode) for episode in numbers]
     shown = sum(episode < traced for episode in numbers)
-    return Task(backend, case.cell, case.controller, case.policy, case.gains, numbers, seeds, trace_hz, shown)
+    return Task(
+        backend, case.cell, case.controller, case.policy, case.gains, numbers, seeds, trace_hz, shown, tuple(METRICS)
+    )
 
 
 def chunks_of(episodes: int, size: int) -> list[range]:
@@ -122,6 +129,7 @@ def chunks_of(episodes: int, size: int) -> list[range]:
 
 def run_task(task: Task, on_progress: Callable[[float], None]) -> list[Episode]:
     """Run the episodes of a task; `on_progress` is called with the simulated time (s)."""
+    require_metrics(task.metrics)
     options: dict[str, Any] = {"trace_hz": task.trace_hz, "phases": task.cell.phases, "on_progress": on_progress}
     if task.backend == "batch":
         env = vector_of(task.cell, len(task.seeds))

@@ -77,6 +77,11 @@ class Run:
         """Environment and arguments of a scenario."""
         return next(cell for cell in self.record["configuration"]["cells"] if cell["name"] == scenario)
 
+    @property
+    def registered(self) -> list[str]:
+        """Names of registered metrics that its episodes have."""
+        return [name for name in self.record["configuration"].get("metrics", ()) if name in self.result.metrics]
+
     def tracking(self, scenario: str) -> Tracking:
         return tracking_of(self.cell(scenario)["env_id"])
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from artde_gym.evaluation import statistics, thesis
-from artde_gym.evaluation.console import ALL, REFERENCE, UNITS, measured, share_text, time_text
+from artde_gym.evaluation.console import ALL, REFERENCE, UNITS, digits_of, measured, share_text, time_text
 from artde_gym.evaluation.statistics import Estimate
 from artde_gym.palette import looks
 from artde_gym.report.chart import Axis, Chart
@@ -71,7 +71,7 @@ def survival(run: Run, scenario: str) -> str:
         chart.line(x, y, shown[name], text=name, kind="path")
         chart.marker(end, float(y[-1]), shown[name], f"{name}: {y[-1]:.0f} %")
     caption = "Survival: the share of episodes in which the robot has not fallen yet."
-    printed = thesis.TIME_TO_FALL.get(_reference(scenario) or "", {})
+    printed = thesis.reported(_reference(scenario)).time_to_fall
     for name, time in printed.items():
         if name in shown and time <= end:
             chart.cross(time, 50.0, shown[name], f"{name} fell at {time:g} s in the thesis")
@@ -83,7 +83,8 @@ def metrics(run: Run, scenario: str) -> list[str]:
     """Every metric by axis and controller; the main one open with a chart, the others folded away."""
     entry = SCENARIOS.get(scenario)
     parts = []
-    for number, (metric, title, axes) in enumerate(measured(run.tracking(scenario), entry.phases if entry else ())):
+    shown = measured(run.tracking(scenario), entry.phases if entry else (), run.registered)
+    for number, (metric, title, axes) in enumerate(shown):
         lines = _table(run, scenario, metric, title, axes)
         parts.append(_dots(run, scenario, metric, title, axes) + lines if number == 0 else details(title, lines))
     return parts
@@ -129,7 +130,7 @@ def events(run: Run, scenario: str) -> str:
 def _table(run: Run, scenario: str, metric: str, title: str, axes: list[str]) -> str:
     result, reference = run.result, _reference(scenario)
     rivals = REFERENCE in result.controllers and len(result.controllers) > 1
-    digits = _digits(metric)
+    digits = digits_of(metric)
     rows = []
     for axis in axes:
         column = metric if axis == ALL else f"{metric}_{axis}"
@@ -197,7 +198,7 @@ def _dots(run: Run, scenario: str, metric: str, title: str, axes: list[str]) -> 
             chart.dash(x, printed, f"{name} in the thesis: {printed:g}")
         if math.isfinite(mean.low):
             chart.interval(x, mean.low, mean.high, shown[name])
-        chart.marker(x, mean.value, shown[name], f"{name}: {_text(mean, _digits(metric))}")
+        chart.marker(x, mean.value, shown[name], f"{name}: {_text(mean, digits_of(metric))}")
     caption = f"{title}, mean with its 95 % interval"
     if any(printed is not None for *_, printed in points):
         caption += "; a short bar is the thesis' value for the controller in its column"
@@ -207,10 +208,6 @@ def _dots(run: Run, scenario: str, metric: str, title: str, axes: list[str]) -> 
 def _reference(scenario: str) -> str | None:
     entry = SCENARIOS.get(scenario)
     return entry.thesis if entry else None
-
-
-def _digits(metric: str) -> int:
-    return next(digits for unit, (_, digits) in UNITS.items() if unit in metric.split("_"))
 
 
 def _text(estimate: Estimate, digits: int, sign: str = "") -> str:

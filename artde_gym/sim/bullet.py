@@ -15,7 +15,7 @@ import weakref
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pybullet_data
@@ -53,11 +53,11 @@ class _Snapshot(NamedTuple):
 
 
 class BulletEngine:
-    """One robot on a plane in a Bullet world of its own."""
+    """One robot on a plane in a Bullet world of its own; it draws everywhere, whatever `renders` says."""
 
-    name: Literal["bullet", "mujoco"] = "bullet"
+    name = "bullet"
 
-    def __init__(self, spec: RobotSpec, time_step: float = 0.001) -> None:
+    def __init__(self, spec: RobotSpec, time_step: float = 0.001, *, renders: bool = False) -> None:
         self.spec = spec = spec.with_rotor_links() if any(spec.armature) else spec
         self.time_step = time_step
         self._client = bullet.connect(bullet.DIRECT)
@@ -242,6 +242,11 @@ class BulletEngine:
         point = self.site(site)
         link = self._links[self._site(site)[0]]
         bullet.applyExternalForce(self._robot, link, force, point, bullet.WORLD_FRAME, physicsClientId=self._client)
+
+    def load_base(self, force: Vector, torque: Vector) -> None:
+        quat = bullet.getBasePositionAndOrientation(self._robot, physicsClientId=self._client)[1]
+        back = (-quat[0], -quat[1], -quat[2], quat[3])
+        self.push_base(rotated(force, back), rotated(torque, back))
 
     def lift_feet(self, forces: Sequence[float]) -> None:
         client = self._client

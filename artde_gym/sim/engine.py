@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Literal, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,13 @@ class World(Protocol):
 
         Raises:
             RobotError: for a site that the spec does not have.
+        """
+        ...
+
+    def load_base(self, force: Vector, torque: Vector) -> None:
+        """Add a force (N) at the base link's own center of mass and a torque (Nm), world axes, for the next step only.
+
+        A payload does not move their point of action.
         """
         ...
 
@@ -108,7 +115,7 @@ class Engine(World, Protocol):
     or restored afterwards; they start at 9.81 m/s^2 downward and at the spec's. Friction has no default: set it.
     """
 
-    name: Literal["bullet", "mujoco"]
+    name: str
     spec: RobotSpec
     time_step: float
 

@@ -1,42 +1,122 @@
-"""Engines by name, imported when asked for; which one is the default is decided here alone."""
+"""The one table of physics engines, imported when asked for; which one is the default is decided here alone."""
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import importlib
 import platform
 import sys
-from typing import TYPE_CHECKING, Literal, cast
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from artde_gym.errors import MissingDependencyError, OptionError
 from artde_gym.multibody.spec import RobotSpec
+from artde_gym.registry import Registry
 from artde_gym.sim.engine import Engine
 
 if TYPE_CHECKING:
     from artde_gym.sim.mujoco_batch import MujocoBatch
 
-EngineName = Literal["bullet", "mujoco"]
+EngineName: TypeAlias = str
+"""One of `ENGINES`."""
 
-ENGINES: dict[EngineName, str] = {"bullet": "PyBullet", "mujoco": "MuJoCo"}
-"""All engines, and how they are written."""
+
+@dataclasses.dataclass(frozen=True)
+class EngineSpec:
+    """A physics engine.
+
+    Attributes:
+        name: in arguments and on the command line.
+        title: as it is written.
+        entry_point: "module:class" of an `artde_gym.sim.engine.Engine`, called with a robot's spec, `time_step` (s) and
+            `renders`, whether pictures will be asked for.
+        package: to install where it is missing, as `pip install` takes it.
+        vector_entry_point: "module:class" of many worlds at once (as `artde_gym.sim.mujoco_batch.MujocoBatch`), called
+            with a spec, their number, `time_step` and a number of threads; None for an engine without.
+        why_missing: in place of an attempt to import it: says why it cannot be used here and what to do about it; an
+            empty string where it can.
+    """
+
+    name: str
+    title: str
+    entry_point: str
+    package: str
+    vector_entry_point: str | None = None
+    why_missing: Callable[[], str] | None = None
+
+    def missing(self) -> str:
+        """Say why it cannot be used here and what to do about it; an empty string where it can."""
+        if self.why_missing is not None:
+            return self.why_missing()
+        try:
+            _imported(self.entry_point)
+        except ImportError as error:
+            return f"{self.title} cannot be imported ({error}): pip install '{self.package}'"
+        return ""
+
+    def load(self, entry_point: str) -> Any:
+        """Import one of its classes.
+
+        Raises:
+            MissingDependencyError: if it cannot be used here.
+        """
+        if missing := self.missing():
+            raise MissingDependencyError("engine", self.name, missing)
+        return _imported(entry_point)
+
+
+def _imported(entry_point: str) -> Any:
+    module, name = entry_point.split(":")
+    return getattr(importlib.import_module(module), name)
+
+
+_BULLET = EngineSpec(
+    "bullet",
+    "PyBullet",
+    "artde_gym.sim.bullet:BulletEngine",
+    "artde-gym[bullet]",
+    why_missing=lambda: missing_bullet(),
+)
+_MUJOCO = EngineSpec(
+    "mujoco",
+    "MuJoCo",
+    "artde_gym.sim.mujoco:MujocoEngine",
+    "mujoco",
+    vector_entry_point="artde_gym.sim.mujoco_batch:MujocoBatch",
+)
+
+ENGINES: Registry[EngineSpec] = Registry(
+    "engine", "artde_gym.engines", lambda spec: {spec.name: spec}, {spec.name: spec for spec in (_BULLET, _MUJOCO)}
+)
+"""All engines by name; the first one that can be used is the default."""
+
+
+def register_engine(spec: EngineSpec, *, replace: bool = False) -> None:
+    """Make an engine known to environments and to the command line.
+
+    Raises:
+        OptionError: if its name is taken and `replace` is not given.
+    """
+    ENGINES.register(spec.name, spec, replace=replace)
 
 
 def resolve_engine(name: str | None) -> EngineName:
-    """Return the engine called `name`; for None, Bullet where it can be imported, else MuJoCo.
+    """Return the engine called `name`; for None, the first one that can be used here: Bullet before MuJoCo.
 
     Raises:
         OptionError: for an unknown engine.
     """
     if name is None:
-        return "mujoco" if missing_bullet() else "bullet"
-    if not (isinstance(name, str) and name in ENGINES):
-        raise OptionError("engine", name, "'bullet', 'mujoco', or None for the default")
-    return cast(EngineName, name)
+        return next((spec.name for spec in ENGINES.values() if not spec.missing()), _MUJOCO.name)
+    if not isinstance(name, str) or name not in ENGINES:
+        raise OptionError("engine", name, f"{', '.join(map(repr, ENGINES))}, or None for the default")
+    return name
 
 
 def installed_engines() -> dict[EngineName, str]:
     """Return the engines that can be used here, and how they are written."""
-    return {name: written for name, written in ENGINES.items() if name != "bullet" or not missing_bullet()}
+    return {name: spec.title for name, spec in ENGINES.items() if not spec.missing()}
 
 
 @functools.cache
@@ -78,26 +158,19 @@ def make_engine(name: EngineName | None, spec: RobotSpec, time_step: float, *, r
         OptionError: for an unknown engine, one that is not installed (MissingDependencyError), or one that cannot draw.
         RobotError: for a robot that the engine cannot simulate.
     """
-    if resolve_engine(name) == "bullet":
-        if missing := missing_bullet():
-            raise MissingDependencyError("engine", "bullet", missing)
-        from artde_gym.sim.bullet import BulletEngine  # imported only when used
-
-        return BulletEngine(spec, time_step)
-    from artde_gym.sim.mujoco import MujocoEngine
-
-    return MujocoEngine(spec, time_step, renders=renders)
+    engine = ENGINES[resolve_engine(name)]
+    return engine.load(engine.entry_point)(spec, time_step, renders=renders)
 
 
-def make_batch(name: EngineName | None, spec: RobotSpec, n: int, time_step: float, threads: int) -> MujocoBatch:
+def make_batch(name: EngineName, spec: RobotSpec, n: int, time_step: float, threads: int) -> MujocoBatch:
     """Build `n` worlds of `spec` in the engine called `name`, stepped by so many threads.
 
     Raises:
         OptionError: for an engine that has no batches.
         RobotError: for a robot that the engine cannot simulate.
     """
-    if name not in (None, "mujoco"):
-        raise OptionError("engine", name, "'mujoco'; engine 'bullet' has no batches: make single environments there")
-    from artde_gym.sim.mujoco_batch import MujocoBatch
-
-    return MujocoBatch(spec, n, time_step, threads)
+    able = {one.name: one.vector_entry_point for one in ENGINES.values() if one.vector_entry_point is not None}
+    if not isinstance(name, str) or name not in able:
+        without = f"; engine {name!r} has no batches: make single environments there" if name in ENGINES else ""
+        raise OptionError("engine", name, f"{', '.join(map(repr, able))}{without}")
+    return ENGINES[name].load(able[name])(spec, n, time_step, threads)

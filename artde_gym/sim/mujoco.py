@@ -10,7 +10,7 @@ fall is the formula of free fall.
 
 from __future__ import annotations
 
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -43,7 +43,7 @@ class MujocoEngine(MujocoWorld):
         RobotError: for a robot whose rotors are links.
     """
 
-    name: Literal["bullet", "mujoco"] = "mujoco"
+    name = "mujoco"
 
     def __init__(self, spec: RobotSpec, time_step: float = 0.001, *, renders: bool = False) -> None:
         blueprint = Blueprint(spec, time_step)

@@ -91,6 +91,10 @@ class MujocoWorld(abc.ABC):
         arm = data.site_xpos[number] - data.xipos[body]
         self.add_force(body, force, np.cross(arm, force))
 
+    def load_base(self, force: Vector, torque: Vector) -> None:
+        """See `artde_gym.sim.engine.World`."""
+        self.add_force(self._blueprint.base, force, torque)
+
     def lift_feet(self, forces: Sequence[float]) -> None:
         """See `artde_gym.sim.engine.World`."""
         for foot, force in zip(self._blueprint.feet, forces, strict=True):

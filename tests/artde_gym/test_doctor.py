@@ -42,8 +42,8 @@ def test_no_check_ends_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPATH", f"{Path(__file__).parent}:{os.environ.get('PYTHONPATH', '')}")
     monkeypatch.syspath_prepend(str(Path(__file__).parent))
     for name in ("raises", "dies", "exits", "hangs"):
-        monkeypatch.setitem(CHECKS, name, (name, f"broken_checks:{name}"))
-    monkeypatch.setitem(CHECKS, "gone", ("gone", "artde_gym.nowhere:nothing"))
+        monkeypatch.setitem(CHECKS, name, examination.Check(name, f"broken_checks:{name}"))
+    monkeypatch.setitem(CHECKS, "gone", examination.Check("gone", "artde_gym.nowhere:nothing"))
     names = ["raises", "dies", "exits", "gone", "files"]
     found = {name: report.outcomes for name, report in examine(names)}
     with monkeypatch.context() as hurry:

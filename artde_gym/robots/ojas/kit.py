@@ -16,6 +16,7 @@ from typing import Any
 from artde_gym.kit import Environment, FrontierTest, Motion, Push, Range, RobotKit, random_push
 from artde_gym.robots.ojas.model import ojas
 from artde_gym.robots.ojas.pushes import ARM_PUSH, CHEST_PUSH
+from artde_gym.robots.ojas.thesis import REPORTED
 from artde_gym.scenarios import Scenario
 
 _WALK, _PUSH = "BipedWalk-Payload-v0", "BipedPush-v0"
@@ -114,6 +115,7 @@ KIT = RobotKit(
             "actuators",
             "armature",
             "contact",
+            "effects",
             "encoders",
             "feet",
             "joints",
@@ -127,6 +129,7 @@ KIT = RobotKit(
     ),
     scenarios=_SCENARIOS,
     reproduced=(("S1", "S2", "S3", "S1-L4", "S2-L4", "S3-L4"), ("tde", "atde", "artde")),
+    reported=REPORTED,
     frontier=_FRONTIER,
     motion=Motion("walk", 6.0, 2.0),
     push=Push("chest", 20.0),

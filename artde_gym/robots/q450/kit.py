@@ -10,6 +10,7 @@ from typing import Any
 
 from artde_gym.kit import Environment, FrontierTest, Motion, Push, Range, RobotKit, random_push
 from artde_gym.robots.q450.model import ROTORS, q450
+from artde_gym.robots.q450.thesis import REPORTED
 from artde_gym.scenarios import Scenario
 
 _INFINITY = "QuadInfinity-Payload-v0"
@@ -68,13 +69,14 @@ KIT = RobotKit(
             main=("Q1", "Q1-calm", "Q1-gale"),
         ),
     ),
-    capabilities=frozenset({"actuators", "flight", "mass", "payload", "rotors", "sensors", "sites"}),
+    capabilities=frozenset({"actuators", "effects", "flight", "mass", "payload", "rotors", "sensors", "sites"}),
     defaults={"payload.position": (0.01, 0.0, -0.1), "push.body": "body"},
     scenarios=_SCENARIOS,
     reproduced=(
         ("Q1", "Q1-calm", "Q1-gale"),
         ("tde", "atde", "artde", "asmc", "pid", "geometric", "indi"),
     ),
+    reported=REPORTED,
     frontier=_FRONTIER,
     motion=Motion("flight", 4.0, 29.0),
     push=Push("body", 3.0),

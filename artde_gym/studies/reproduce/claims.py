@@ -1,4 +1,4 @@
-"""The thesis' claims as data, each with a verdict from seeded episodes.
+"""Claims as data, each with a verdict from seeded episodes; each robot brings its own.
 
 A verdict is *holds* or *does not hold* where the 95 % intervals say so, *undecided* where they do not, and *not
 measured* where an episode or a controller is missing. Claims of single runs ("TDE falls, ARTDE does not") are read as
@@ -15,10 +15,11 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
-from artde_gym.evaluation import statistics, thesis
+from artde_gym.evaluation import statistics
 from artde_gym.evaluation.pairing import paired_across
 from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.statistics import Estimate
+from artde_gym.registry import Registry
 
 CLAIM_COLUMNS = ["scenario", "claim", "verdict", "measured", "thesis"]
 Outcome = Literal["holds", "does not hold", "undecided", "not measured"]
@@ -39,7 +40,7 @@ class Claim:
     Attributes:
         scenario: in which it is made.
         text: the statement.
-        thesis: the thesis' own number or observation; "ours" for a question that we add.
+        thesis: the publication's own number or observation; "ours" for a question that we add.
         judge: episodes -> verdict.
         ablation: whether it takes the ablation of `artde_gym.studies.reproduce.reproduction`.
     """
@@ -159,120 +160,33 @@ def ordered(scenario: str, names: Sequence[str], metric: str) -> Callable[[Resul
     return judge
 
 
-_FALL = {"tde": True, "atde": True, "artde": False}
-_WALK = {"tde": False, "atde": False, "artde": False}
-
-CLAIMS: tuple[Claim, ...] = (
-    Claim("S1", "nobody falls", "nobody falls", falls("S1", _WALK)),
-    *(
-        Claim(
-            "S1",
-            f"ARTDE's RMSE is below {rival.upper()}'s on every joint by at least {least} %",
-            f">= {least} % printed; {true} % follows from table 2.1",
-            improves("S1", rival, "rmse_deg", thesis.JOINTS, least),
-        )
-        for rival, least, true in (("tde", 29.1, 32.7), ("atde", 20.6, 20.1))
-    ),
-    *(
-        Claim(
-            "S1",
-            f"ARTDE's maximum error is below {rival.upper()}'s on every joint",
-            f">= {least} % in table 2.1",
-            improves("S1", rival, "max_abs_error_deg", thesis.JOINTS),
-        )
-        for rival, least in (("tde", 38.1), ("atde", 21.1))
-    ),
-    Claim("S2", "TDE and ATDE fall with the payload, ARTDE does not", "26 s, 31 s, walks", falls("S2", _FALL)),
-    Claim("S3", "ARTDE survives both pushes", "walks", falls("S3", {"artde": False})),
-    Claim(
-        "S3",
-        "ARTDE's RMSE repeats that of S2 within 15 % on every joint",
-        "<= 14 % (q2 of phase 3)",
-        repeats("S3", "S2", "rmse_deg", thesis.JOINTS, 15.0),
-    ),
-    Claim("S1-L4", "at 4 ms: nobody falls", "1 ms in the thesis", falls("S1-L4", _WALK)),
-    Claim("S2-L4", "at 4 ms: TDE and ATDE fall with the payload, ARTDE does not", "1 ms", falls("S2-L4", _FALL)),
-    Claim("S3-L4", "at 4 ms: ARTDE survives both pushes", "1 ms in the thesis", falls("S3-L4", {"artde": False})),
-    *(
-        Claim(
-            name,
-            "adaptation adds to the equivalent extra stiffness (ARTDE against tde+kd)",
-            "ours",
-            adapts(name, "tde+kd", "rmse_deg"),
-            ablation=True,
-        )
-        for name in ("S1", "S2", "S3", "S1-L4", "S2-L4", "S3-L4")
-    ),
-    Claim("Q1", "nobody crashes", "nobody crashes", falls("Q1", {"atde": False, "asmc": False, "artde": False})),
-    *(
-        Claim(
-            "Q1",
-            f"ARTDE's RMSE is below {rival.upper()}'s in y and z by more than 30 %",
-            f"> 30 % printed; {true} follow from table 3.1",
-            improves("Q1", rival, "rmse_m", ("y", "z"), 30.0),
-        )
-        for rival, true in (("atde", "33 and 69 %"), ("asmc", "23 and 69 %"))
-    ),
-    *(
-        Claim(
-            "Q1",
-            f"ARTDE's peak error is below {rival.upper()}'s in x, y and z",
-            f"{true} in table 3.1",
-            improves("Q1", rival, "max_abs_error_m", thesis.POSITION),
-        )
-        for rival, true in (("atde", "0, 19 and 7 %"), ("asmc", "31, 12 and 0 %"))
-    ),
-    *(
-        Claim(
-            "Q1",
-            f"ARTDE's RMS roll and pitch errors are below {rival.upper()}'s",
-            f"{true} in table 3.1",
-            improves("Q1", rival, "rmse_deg", thesis.ATTITUDE[:2]),
-        )
-        for rival, true in (("atde", "37 and 25 %"), ("asmc", "-4 and 5 %"))
-    ),
-    *(
-        Claim(
-            "Q1",
-            f"ARTDE's peak attitude error is below {rival.upper()}'s on every axis",
-            f"{true} in table 3.1",
-            improves("Q1", rival, "max_abs_error_deg", thesis.ATTITUDE),
-        )
-        for rival, true in (("atde", "51, 25 and 4 %"), ("asmc", "22, 3 and 23 %"))
-    ),
-    *(
-        Claim(
-            "Q1",
-            f"ARTDE sways less than {rival.upper()} after the payload's drop (peak error)",
-            "the others sway, ARTDE does not",
-            improves("Q1", rival, "peak_error_m", ("drop",)),
-        )
-        for rival in ("atde", "asmc")
-    ),
-    *(
-        Claim(
-            name,
-            f"adaptation adds to {what} in wind (ARTDE against {rival})",
-            "ours",
-            adapts(name, rival, "rmse_m"),
-            ablation=rival == "tde+kd",
-        )
-        for name in ("Q1", "Q1-gale")
-        for what, rival in (("plain TDE", "tde"), ("the equivalent extra stiffness", "tde+kd"))
-    ),
-    Claim(
-        "Q1-calm",
-        "ARTDE is better than ATDE, and ATDE than TDE, without wind too",
-        "ours",
-        ordered("Q1-calm", ("artde", "atde", "tde"), "rmse_m"),
-    ),
-)
+CLAIMS: Registry[tuple[Claim, ...]] = Registry("claims", "artde_gym.claims")
+"""Claims by robot: those of plug-ins, and those registered."""
 
 
-def judge(result: Result, claims: Sequence[Claim] = CLAIMS) -> pd.DataFrame:
-    """One row a claim: scenario, claim, verdict, measured, thesis."""
+def register_claims(name: str, claims: Sequence[Claim], *, replace: bool = False) -> None:
+    """Have more claims judged by `reproduce`, in whose scenarios they are made.
+
+    Args:
+        name: under which they are known, such as a robot's.
+        claims: to be judged.
+        replace: whether they may take the place of others of the same name.
+
+    Raises:
+        OptionError: if the name is taken and `replace` is not given.
+    """
+    CLAIMS.register(name, tuple(claims), replace=replace)
+
+
+def all_claims() -> tuple[Claim, ...]:
+    """Return the claims of all robots."""
+    return tuple(itertools.chain.from_iterable(CLAIMS.values()))
+
+
+def judge(result: Result, claims: Sequence[Claim] | None = None) -> pd.DataFrame:
+    """Judge some claims, or all; one row a claim: scenario, claim, verdict, measured, thesis."""
     rows = []
-    for claim in claims:
+    for claim in all_claims() if claims is None else claims:
         verdict = claim.judge(result)
         rows.append((claim.scenario, claim.text, verdict.outcome, verdict.measured, claim.thesis))
     return pd.DataFrame(rows, columns=CLAIM_COLUMNS)

@@ -30,7 +30,7 @@ from artde_gym.evaluation.store import write_atomically
 from artde_gym.evaluation.tasks import Update
 from artde_gym.kit import ROBOTS, RobotKit
 from artde_gym.scenarios import scenario as find_scenario
-from artde_gym.studies.reproduce.claims import CLAIMS, judge
+from artde_gym.studies.reproduce.claims import all_claims, judge
 
 ADAPTIVE, ABLATION = "artde", "tde+kd"
 TRACED = 3  # episodes of each cell that leave their signals: to look at; compressing all takes a minute or two
@@ -129,7 +129,7 @@ def reproduce(
     for cell in plan.cells if ablation else ():
         if result.complete:
             result = _with_ablation(result, plan, cell, folder, on_progress)
-    made = [claim for claim in CLAIMS if claim.scenario in result.scenarios and (ablation or not claim.ablation)]
+    made = [claim for claim in all_claims() if claim.scenario in result.scenarios and (ablation or not claim.ablation)]
     verdicts = judge(result, made)
     text = verdicts.to_csv(index=False, lineterminator="\n")
     write_atomically(folder / "claims.csv", lambda file: file.write(text.encode()))

@@ -9,7 +9,7 @@ import pytest
 from artde_gym.evaluation import evaluate
 from artde_gym.report import write_report
 from artde_gym.studies import frontier
-from artde_gym.studies.reproduce.claims import CLAIMS, judge
+from artde_gym.studies.reproduce.claims import all_claims, judge
 
 SHORT = {"duration": 3.0, "actuator_inertia": "lumped"}
 
@@ -20,7 +20,9 @@ def walks(tmp_path_factory):
     push = {"body": "chest", "magnitude": 60.0, "direction": [1.0, 0.0, 0.0], "start": 0.5, "duration": 0.2}
     arguments = {"episodes": 2, "out": folder, "env_kwargs": SHORT}
     result = evaluate(["tde", "artde"], scenario="S1", disturbances={"push": [push]}, **arguments)
-    judge(result, [claim for claim in CLAIMS if claim.scenario == "S1"]).to_csv(folder / "claims.csv", index=False)
+    judge(result, [claim for claim in all_claims() if claim.scenario == "S1"]).to_csv(
+        folder / "claims.csv", index=False
+    )
     arguments |= {"out": folder / "ablation" / "S1", "gains": {"tde+kd": {"c": 5.0}}}
     evaluate(["tde+kd"], scenario="S1", disturbances={"push": [push]}, **arguments)
     write_report(folder, pictures=True)

@@ -1,0 +1,127 @@
+"""Effects of registered kinds on n robots at once; a single environment is the case n = 1."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from artde_gym.arrays import Array
+from artde_gym.disturbances.kinds import KINDS, Load, RobotStates
+from artde_gym.disturbances.numeric import Words, number_of
+from artde_gym.errors import DisturbanceError
+from artde_gym.sim.engine import State, World
+
+Numbers = Mapping[str, Any]
+
+_NOTHING = (0.0, 0.0, 0.0)
+_NO_LOAD = Load()
+
+
+class _Group(NamedTuple):
+    """Robots on which one kind acts, and its values: one row a robot."""
+
+    kind: str
+    robots: NDArray[np.intp]
+    values: Mapping[str, Array]
+
+
+class Effects:
+    """The effects on n robots; `begin` starts an episode of one of them.
+
+    Args:
+        n: number of robots.
+        words: names of the robot's sites and joints.
+
+    Attributes:
+        acting: robots (n,) on which any effect acts.
+    """
+
+    def __init__(self, n: int, words: Words) -> None:
+        self._words = words
+        self._sampled: list[list[tuple[str, int, Numbers]]] = [[] for _ in range(n)]
+        self._groups: list[_Group] | None = []
+        self.acting = np.zeros(n, np.bool_)
+
+    def begin(self, robot: int, sampled: Mapping[str, Any]) -> None:
+        """Start an episode of a robot with sampled disturbances."""
+        entries = [
+            (name, number, self._numbers(name, entry))
+            for name, value in sampled.items()
+            if KINDS[name].effect is not None
+            for number, entry in enumerate(value if KINDS[name].repeated else (value,))
+        ]
+        if entries or self._sampled[robot]:
+            self._sampled[robot], self._groups = entries, None
+            self.acting[robot] = bool(entries)
+
+    def load(self, states: RobotStates) -> Load:
+        """Compute the loads during the next physics step on all robots; of kinds that give none, None.
+
+        Raises:
+            DisturbanceError: if an effect gives anything but a `Load`, or an array of another shape.
+        """
+        if self._groups is None:
+            self._groups = self._grouped()
+        total: dict[str, Array] = {}
+        shapes = {"tau": states.q.shape, "force": states.position.shape, "torque": states.position.shape}
+        for group in self._groups:
+            some = RobotStates(*(part[group.robots] for part in states))
+            for name, part in _load_of(group, some)._asdict().items():
+                if part is not None:
+                    _check_shape(group, name, part, shapes[name][1:])
+                    total.setdefault(name, np.zeros(shapes[name]))[group.robots] += part
+        return Load(**total)
+
+    def act(self, world: World, state: State, time: float) -> Array | float:
+        """Load the base of the only robot for a physics step; returns torques (joints,) (Nm) to be added, or 0."""
+        load = self.load_of(state, time)
+        load_base(world, load, 0)
+        return 0.0 if load.tau is None else load.tau[0]
+
+    def load_of(self, state: State, time: float) -> Load:
+        """Compute the loads on the only robot, in a state at a time (s) of its episode."""
+        if not self.acting[0]:
+            return _NO_LOAD
+        return self.load(RobotStates(*(np.array([part]) for part in (time, *state))))
+
+    def _numbers(self, kind: str, entry: Mapping[str, Any]) -> Numbers:
+        parameters = [parameter for parameter in KINDS[kind].parameters if parameter.name in entry]
+        return {p.name: number_of(p, entry[p.name], self._words) for p in parameters}
+
+    def _grouped(self) -> list[_Group]:
+        """Gather the entries that one call can compute: of the same kind, number and parameters."""
+        groups: dict[Any, tuple[list[int], list[Numbers]]] = {}
+        for robot, entries in enumerate(self._sampled):
+            for kind, number, values in entries:
+                robots, rows = groups.setdefault((kind, number, tuple(values)), ([], []))
+                robots.append(robot)
+                rows.append(values)
+        return [
+            _Group(kind, np.array(robots), {name: np.array([row[name] for row in rows]) for name in names})
+            for (kind, _, names), (robots, rows) in sorted(groups.items(), key=lambda item: item[0])
+        ]
+
+
+def _load_of(group: _Group, some: RobotStates) -> Load:
+    effect: Any = KINDS[group.kind].effect
+    load = effect(group.values, some)
+    if not isinstance(load, Load):
+        raise DisturbanceError(f"effect of {group.kind!r}", load, "a Load")
+    return load
+
+
+def load_base(world: World, load: Load, robot: int) -> None:
+    """Load the base of one of n robots for the next physics step."""
+    if load.force is not None or load.torque is not None:
+        parts = (_NOTHING if part is None else part[robot].tolist() for part in (load.force, load.torque))
+        (fx, fy, fz), (x, y, z) = parts
+        world.load_base((fx, fy, fz), (x, y, z))
+
+
+def _check_shape(group: _Group, name: str, part: Any, size: tuple[int, ...]) -> None:
+    needed = (len(group.robots), *size)
+    if np.shape(part) != needed:
+        raise DisturbanceError(f"{name} of the effect of {group.kind!r}", np.shape(part), f"an array {needed}")
