@@ -2,18 +2,31 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 
 from artde_gym.doctor.outcome import Outcome
-from controllers.design import Design
-from controllers.drive import DRIVES
+from controllers.design import Design, preset_designs
+from controllers.drive import DRIVES, Drive
 
 REMEDY = "choose a smaller m_bar, or another actuator model"
 
 
 def validity() -> list[Outcome]:
-    """Every robot whose drive has a check of it."""
-    return [found for drive in DRIVES.values() if drive.stability is not None for found in drive.stability()]
+    """Every robot: by the check that its drive brings, else all presets of all loops."""
+    return [found for drive in DRIVES.values() for found in (drive.stability or functools.partial(_presets, drive))()]
+
+
+def _presets(drive: Drive) -> list[Outcome]:
+    """Judge each loop that a drive lists at the presets of its laws."""
+    outcomes: list[Outcome] = []
+    for loop in [] if drive.loops is None else drive.loops():
+        designs = [one for tuned in (False, True) for one in preset_designs(loop, drive, tuned=tuned)]
+        if designs:
+            valid, found = judged(designs)
+            status, remedy = ("ok", "") if valid else ("failed", REMEDY)
+            outcomes.append(Outcome(f"{drive.robot}, {loop.name}", status, found, remedy))
+    return outcomes
 
 
 def judged(designs: Sequence[Design]) -> tuple[bool, str]:

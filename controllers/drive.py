@@ -37,8 +37,8 @@ class Drive:
         period: sampling period of its environments where nothing else is asked for (s).
         loops: for `artde-gym design`: lists its parts, each with its inertia along the reference, which the keyword
             arguments describe; None if the robot has no such model.
-        stability: for `artde-gym doctor`: tells whether time-delay estimation converges at the presets; None for no
-            check.
+        stability: for `artde-gym doctor`: tells whether time-delay estimation converges at the presets; None to judge
+            all presets of all loops.
     """
 
     robot: str

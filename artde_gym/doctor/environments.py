@@ -14,11 +14,12 @@ import numpy as np
 from gymnasium.utils.env_checker import check_env
 
 import artde_gym  # noqa: F401  # registers the environments
+from artde_gym.disturbances import KINDS
 from artde_gym.doctor.outcome import Outcome
 from artde_gym.errors import OptionError
-from artde_gym.evaluation.environments import ours, vector
+from artde_gym.evaluation.environments import arguments_of, ours, robot_of, vector
 
-ARGUMENTS: dict[str, Any] = {"duration": 3.0, "disturbances": {"payload": 0.3}}
+DURATION, PAYLOAD = 3.0, {"payload": 0.3}  # s, kg
 IN_SI_UNITS = r".*(symmetric and normalized|recommend using np.float32)"
 """Warnings that are no findings: actions are in Nm and N, and float64, by design; RescaleAction gives [-1, 1]."""
 REMEDY = "pip install -c constraints.txt --force-reinstall . : the tests pass with these versions"
@@ -33,7 +34,7 @@ def mujoco() -> list[Outcome]:
     """Likewise in the second engine."""
     if importlib.util.find_spec("mujoco") is None:
         return [Outcome("MuJoCo", "missing", "not installed", "pip install 'artde-gym[mujoco]'")]
-    return [_checked(name, "mujoco", _gymnasium) for name in ours()]
+    return [_checked(name, "mujoco", _gymnasium) for name in ours() if "engine" in arguments_of(name)]
 
 
 def stable_baselines3() -> list[Outcome]:
@@ -51,7 +52,7 @@ def batch() -> list[Outcome]:
         if gym.spec(name).vector_entry_point is None:
             continue
         try:
-            both: list[Any] = [vector(name, json.dumps(ARGUMENTS), size) for size in (8, 1)]
+            both: list[Any] = [vector(name, json.dumps(_arguments(name)), size) for size in (8, 1)]
         except OptionError as error:  # the biped's are MuJoCo's
             outcomes.append(Outcome(name, "missing", f"{error.field} {error.value!r} is not there", error.allowed))
             continue
@@ -74,9 +75,17 @@ def _gymnasium(env: Any) -> None:
     check_env(env, skip_render_check=True)  # pictures have a check of their own
 
 
+def _arguments(name: str, engine: str | None = None) -> dict[str, Any]:
+    """Arguments for a short episode with a payload, as far as the environment takes them."""
+    wanted: dict[str, Any] = {"duration": DURATION, "engine": engine} if engine else {"duration": DURATION}
+    if KINDS["payload"].honored_by(robot_of(name)):
+        wanted["disturbances"] = PAYLOAD
+    return {argument: value for argument, value in wanted.items() if argument in arguments_of(name)}
+
+
 def _checked(name: str, engine: str, checker: Callable[[Any], None]) -> Outcome:
     try:
-        env = gym.make(name, disable_env_checker=True, engine=engine, **ARGUMENTS)
+        env = gym.make(name, disable_env_checker=True, **_arguments(name, engine))
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             warnings.filterwarnings("ignore", message=IN_SI_UNITS)
