@@ -6,8 +6,10 @@ of the tutorial.
 
 from __future__ import annotations
 
+import ast
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -193,3 +195,21 @@ def test_no_file_of_the_project_names_it() -> None:
     files = [file for package in ("artde_gym", "baselines", "controllers") for file in (ROOT / package).rglob("*.py")]
     assert files
     assert not [file for file in files if "two_link_arm" in (text := file.read_text()) or "two-link-arm" in text]
+
+
+OWN = re.compile(
+    r"artde_gym/(robots/(ojas|q450)/|envs/(biped|quadrotor))|controllers/(drives|presets)/(ojas|q450)"
+    r"|baselines/((ojas|q450)\w*|legs|tune_balance)\.py"
+)
+"""Modules of the project's own robots; the linear balance law is the biped's."""
+
+
+def test_its_own_robots_are_plug_ins_too() -> None:
+    for package in ("artde_gym", "baselines", "controllers"):
+        for file in (ROOT / package).rglob("*.py"):
+            if not OWN.match(str(file.relative_to(ROOT))):
+                for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+                    if isinstance(node, ast.Constant) and node.value in ("ojas", "q450"):
+                        pytest.fail(f"{file}:{node.lineno} names a robot")
+                    if isinstance(node, (ast.ImportFrom, ast.Import)):
+                        assert not re.search(r"ojas|q450", ast.unparse(node)), f"{file}:{node.lineno}"
