@@ -124,7 +124,8 @@ class RobotKit:
     Attributes:
         name: the `robot_name` of its environments.
         title: how users call it: "biped".
-        model: builds its nominal model, with `mass` (kg) and `sites` ((name, link, place) each).
+        model: builds its nominal model, with `mass` (kg) and `sites` ((name, link, place) each); with
+            `joint_inertia(q)`, reports judge m_bar.
         joints: names of its joints, or of its rotors, of which "all" is a shorthand.
         environments: that `import artde_gym` registers.
         capabilities: by which kinds of disturbances are honored.

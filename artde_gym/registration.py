@@ -15,6 +15,7 @@ import gymnasium as gym
 
 from artde_gym.errors import OptionError, UnknownNameError, among
 from artde_gym.kit import ROBOTS
+from artde_gym.registry import Registry
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,9 +40,12 @@ class GainRange(NamedTuple):
     high: float
 
 
+_brought: Registry[ControllerSpec] = Registry(
+    "controller", "artde_gym.controllers", lambda specs: {spec.name: spec for spec in specs}
+)
+"""Controllers of this project and of installed plug-ins: each entry point names a sequence of them."""
 _controllers: dict[str, ControllerSpec] = {}
-_own: set[str] = set()
-"""Names of the controllers that this project brings."""
+"""Controllers that are registered at run time."""
 
 REPLACEABLE = "preset"
 """The one fixed argument that an override may replace: it says from which gains to start, not which law it is."""
@@ -62,7 +66,7 @@ def register_controller(
         kwargs: fixed arguments of the function, which no override replaces (but for a `preset`).
 
     Raises:
-        OptionError: for a name that is no word, or that of a controller of this project.
+        OptionError: for a name that is no word, or that of a controller of this project or of a plug-in.
         UnknownNameError: if an entry point is not of that form.
     """
     if not (isinstance(name, str) and name):
@@ -71,8 +75,8 @@ def register_controller(
         if point is not None and not _is_entry_point(point):
             raise UnknownNameError(field, point, '"module:function"')
     spec = ControllerSpec(name, entry_point, dict(kwargs), text, search)
-    if name in _own and _controllers[name] != spec:
-        raise OptionError("name of a controller", name, f"a new name; these are taken: {', '.join(sorted(_own))}")
+    if _brought.get(name, spec) != spec:
+        raise OptionError("name of a controller", name, f"a new name; these are taken: {', '.join(sorted(_brought))}")
     register_spec(spec)
 
 
@@ -87,7 +91,7 @@ def register_spec(spec: ControllerSpec) -> None:
 
 def registered_controllers() -> dict[str, ControllerSpec]:
     """All known controllers by name."""
-    return dict(_controllers)
+    return {**_brought, **_controllers}
 
 
 def make_controller(name: str, env: Any, /, **overrides: Any) -> Any:
@@ -120,15 +124,16 @@ def search_space(name: str, env: Any) -> dict[str, GainRange]:
     """
     known = _known(name)
     if known.search is None:
-        tunable = [other for other, spec in _controllers.items() if spec.search is not None]
+        tunable = [other for other, spec in registered_controllers().items() if spec.search is not None]
         raise UnknownNameError("controller to be tuned", name, among(name, tunable))
     return dict(_imported(name, known.search)(env, **known.kwargs))
 
 
 def _known(name: str) -> ControllerSpec:
-    if name not in _controllers:
-        raise UnknownNameError("controller", name, among(name, _controllers))
-    return _controllers[name]
+    known = registered_controllers()
+    if name not in known:
+        raise UnknownNameError("controller", name, among(name, known))
+    return known[name]
 
 
 def _imported(name: str, entry_point: str) -> Callable[..., Any]:
@@ -154,50 +159,7 @@ def resolved(entry_point: str) -> Callable[..., Any]:
 
 
 def register_all() -> None:
-    """Register what all robots and this project bring; called once, by `import artde_gym`."""
+    """Register the environments of all robots; called once, by `import artde_gym`."""
     for kit in ROBOTS.values():
         for entry in kit.environments:
             gym.register(id=entry.env_id, entry_point=entry.entry_point, vector_entry_point=entry.vector_entry_point)
-    register_laws()
-
-
-def register_laws() -> None:
-    """Register the controllers that this project brings."""
-
-    def law(name: str, text: str, **kwargs: Any) -> None:
-        search = "controllers.robots:search_space"
-        register_controller(name, "controllers.robots:make_for_robot", text=text, search=search, **kwargs)
-
-    law("tde", "time-delay estimation", law="tde")
-    law("atde", "TDE + one adaptive gain", law="atde")
-    law("artde", "TDE + adaptive-robust term, as printed in the thesis", law="artde")
-    law("artde-robust", "ARTDE with bounded gains", law="artde", preset="robust")
-    law("pid", "PID; biped: equal to TDE, quadrotor: positional, in both loops", law="pid")
-    law("tde+c", "TDE + robust term of constant gain (ablation)", law="tde+c")
-    law("tde+kd", "TDE at the stiffer gains equivalent to it (ablation)", law="tde+kd")
-    law("asmc", "quadrotor: adaptive sliding mode (a law of ours)", law="asmc")
-    law("indi", "quadrotor: incremental nonlinear dynamic inversion", law="indi")
-    law("geometric", "quadrotor: geometric control on SE(3), with an integral", law="geometric")
-    register_controller(
-        "computed-torque",
-        "controllers.model_based:make_computed_torque",
-        text="biped: feedback linearisation with the nominal model (upper reference)",
-        search="controllers.model_based:search_space",
-    )
-    register_controller(
-        "tde+balance",
-        "baselines.saved:make_shipped",
-        text="biped: TDE + a linear balance law of 28 gains that CMA-ES has tuned under pushes",
-        policies=dict.fromkeys(("BipedPush-v0", "BipedWalk-Payload-v0"), "biped-balance"),
-    )
-    register_controller(
-        "tde+ppo",
-        "baselines.saved:make_shipped",
-        text="TDE + a residual that reinforcement learning (PPO) has trained, one for each environment",
-        policies={
-            "BipedPush-v0": "biped-push",
-            "BipedWalk-Payload-v0": "biped-walk",
-            "QuadInfinity-Payload-v0": "quadrotor-gale",
-        },
-    )
-    _own.update(_controllers)

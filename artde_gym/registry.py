@@ -85,9 +85,22 @@ class Registry(Mapping[str, T], Generic[T]):
             return
         self._loaded = True  # first: what is loaded may look in here
         for point in _in_order(self.group):
-            loaded = point.load()
+            loaded = self._imported(point)
             for name, entry in ({point.name: loaded} if self._unpack is None else self._unpack(loaded)).items():
                 self._add(name, entry, replace=False)
+
+    def _imported(self, point: EntryPoint) -> Any:
+        """Import what a plug-in brings.
+
+        Raises:
+            UnknownNameError: if that cannot be imported.
+        """
+        try:
+            return point.load()
+        except (ImportError, AttributeError) as error:
+            owner = "a plug-in" if point.dist is None else point.dist.name
+            allowed = f'"module:object" that can be imported ({error}); mend or uninstall {owner}'
+            raise UnknownNameError(f"entry point of {point.name!r} in {self.group}", point.value, allowed) from error
 
     def _add(self, name: str, entry: T, replace: bool) -> None:
         if name in self._entries and not replace:

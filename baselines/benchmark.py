@@ -13,11 +13,12 @@ import gymnasium as gym
 from artde_gym.arrays import Array
 from artde_gym.benchmark.figure import Figure, Section
 from artde_gym.benchmark.timing import Job, in_turns
+from baselines.agent import AGENTS
 from baselines.policy_file import DESCRIPTION, read
 from baselines.recipe import Recipe
 from baselines.run import Run, Training
 from baselines.saved import SHIPPED, load
-from baselines.tasks import TASKS
+from baselines.tasks import task as task_of
 
 DECISIONS = 20  # of a turn
 ROUNDS = 40
@@ -88,7 +89,8 @@ def training(quick: bool) -> Section:
     """Decisions a second on one core, and the share of computing outside physics and network."""
     title, text = "Training with PPO", "Decisions of the agent, learning included, in the task's batch, on one core."
     try:
-        figures = [figure for env_id in TASKS for figure in _throughput(env_id, 1 if quick else ROLLOUTS)]
+        tasks = [env_id for agent in AGENTS.values() for env_id in agent.tasks]
+        figures = [figure for env_id in tasks for figure in _throughput(env_id, 1 if quick else ROLLOUTS)]
     except ModuleNotFoundError as error:
         return Section(title, text, skipped=f"{error.name} is missing: pip install 'artde-gym[rl,mujoco]'")
     return Section(title, text, tuple(figures))
@@ -97,7 +99,7 @@ def training(quick: bool) -> Section:
 def _throughput(env_id: str, rollouts: int) -> list[Figure]:
     from baselines.train import Trainer, environments  # torch is heavy, and may not be installed
 
-    task = TASKS[env_id]
+    task = task_of(env_id)
     kwargs = {} if task.batch_engine is None else {"engine": task.batch_engine}
     run_of = Training(env_id, Recipe(task.robot), env_kwargs=kwargs)
     with tempfile.TemporaryDirectory() as folder:

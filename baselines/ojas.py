@@ -18,14 +18,20 @@ closes slowly: nominal walking is the base controller's own.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from artde_gym.layout import Field, Layout
+from artde_gym.robots.ojas import task
+from artde_gym.robots.ojas.model import ActuatorInertia, ojas
+from baselines.agent import JOINTS as ON_JOINTS
+from baselines.agent import Agent
 from baselines.legs import JOINTS, LEG, Mirror, ankle, level, mirrored_joints, moved
+from baselines.ojas_tasks import TASKS
 from baselines.recipe import NO_BASE, Recipe
 from controllers.laws.second_order import FilterMemory, second_order
 from controllers.laws.tracking import Array, sliding_variable
@@ -270,3 +276,21 @@ def _swapped(offsets: Array) -> Array:
 
 def _unmirrored(right: NDArray[np.bool_], joints: Array) -> Array:
     return np.where(right[..., None], mirrored_joints(joints), joints) if right.any() else joints
+
+
+def _nominal_name(kwargs: Mapping[str, Any]) -> str:
+    return f"ojas {kwargs.get('actuator_inertia', 'rotor')}"
+
+
+AGENT = Agent(
+    robot="ojas",
+    coupling=OjasCoupling,
+    channels={"synergies": 250.0, "wide-synergies": 250.0, ON_JOINTS: 25.0},  # ranges bound synergies long before
+    hold=0.02,
+    tasks=TASKS,
+    balanced=frozenset({"synergies", "wide-synergies"}),
+    observation=task.OBSERVATION,
+    action=task.ACTION,
+    nominal={f"ojas {kind}": functools.partial(ojas, kind) for kind in get_args(ActuatorInertia)},
+    nominal_name=_nominal_name,
+)

@@ -13,6 +13,10 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from artde_gym.layout import Field, Layout
+from artde_gym.robots.q450 import task
+from artde_gym.robots.q450.model import q450
+from baselines.agent import Agent
+from baselines.q450_tasks import TASKS
 from baselines.recipe import NO_BASE, Recipe
 from controllers.laws.tracking import Array, sliding_variable
 from controllers.policies import Plant
@@ -146,3 +150,15 @@ class Q450Coupling:
             observation[..., at["position_ref"]] - observation[..., at["position"]],
             observation[..., at["velocity_ref"]] - observation[..., at["velocity"]],
         )
+
+
+AGENT = Agent(
+    robot="q450",
+    coupling=Q450Coupling,
+    channels={"attitude": 0.5, "position": 0.5, "cascade": 0.5},
+    hold=0.015,
+    tasks=TASKS,
+    observation=task.OBSERVATION,
+    action=task.ACTION,
+    nominal={"q450": q450},
+)

@@ -9,12 +9,11 @@ from typing import Any
 
 from artde_gym.arguments import flag, number
 from artde_gym.errors import OptionError, among
+from artde_gym.kit import ROBOTS
+from baselines.agent import agent_of
 
-HOLDS = {"ojas": 0.02, "q450": 0.015}
-"""Default time between two decisions (s), by robot."""
-CHANNELS = {"ojas": ("synergies", "wide-synergies", "joints"), "q450": ("attitude", "position", "cascade")}
-"""What an action may mean, by robot; the first one is the default."""
 NO_BASE = "none"
+DECISION = 0.02  # s, about which a robot decides that has no default of its own
 LONGEST = 10.0  # s, of a hold
 LARGEST = 1e6  # of a limit
 
@@ -28,8 +27,9 @@ class Recipe:
         base: registered name of the base controller; "none", and the action is the force itself.
         gains: in place of the base's preset's.
         channel: "synergies" of the legs, "wide-synergies" or raw "joints" (biped), the "attitude" loop, the "position"
-            loop or both, the "cascade" (quadrotor); see the robots' modules.
-        hold: time between two decisions (s), a whole number of control periods.
+            loop or both, the "cascade" (quadrotor), "joints" of any other robot; see the robots' modules.
+        hold: time between two decisions (s), a whole number of control periods; 0 for as many as come nearest to
+            `DECISION`, where the robot has no default.
         limit: largest size of each component of du (rad/s^2, m/s^2); that of the attitude loop is `TURNING` times it.
         gated: whether the residual fades in by tilt and velocity error (biped), or is there all the time.
 
@@ -46,9 +46,10 @@ class Recipe:
     gated: bool = True
 
     def __post_init__(self) -> None:
-        if not (isinstance(self.robot, str) and self.robot in CHANNELS):
-            raise OptionError("robot", self.robot, among(self.robot, CHANNELS))
-        known = CHANNELS[self.robot]
+        if not (isinstance(self.robot, str) and self.robot in ROBOTS):
+            raise OptionError("robot", self.robot, among(self.robot, ROBOTS))
+        agent = agent_of(self.robot)
+        known = list(agent.channels)
         if self.channel not in ("", *known):
             raise OptionError("channel", self.channel, among(self.channel, known))
         if not isinstance(self.base, str):
@@ -57,7 +58,7 @@ class Recipe:
             raise OptionError("gains", self.gains, "a mapping of names to values")
         channel = self.channel or known[0]
         object.__setattr__(self, "channel", channel)
-        for field, default, most in (("hold", HOLDS[self.robot], LONGEST), ("limit", LIMITS[channel], LARGEST)):
+        for field, default, most in (("hold", agent.hold, LONGEST), ("limit", agent.channels[channel], LARGEST)):
             value = number(field, getattr(self, field), 0.0, most, f"a number > 0, up to {most:g}; 0 for the default")
             object.__setattr__(self, field, value or default)
         object.__setattr__(self, "gated", flag("gated", self.gated))
@@ -68,11 +69,9 @@ class Recipe:
         Raises:
             OptionError: unless it is a whole number.
         """
+        if not self.hold:
+            return max(1, round(DECISION / control_period))
         periods = round(self.hold / control_period)
         if periods < 1 or not math.isclose(periods * control_period, self.hold, rel_tol=1e-9):
             raise OptionError("hold", self.hold, f"whole multiples of the control period {control_period:g} s")
         return periods
-
-
-LIMITS = {"synergies": 250.0, "wide-synergies": 250.0, "joints": 25.0, "attitude": 0.5, "cascade": 0.5, "position": 0.5}
-"""Default limit of du, by channel (rad/s^2, m/s^2). Synergies are bounded by their ranges long before."""

@@ -6,6 +6,7 @@ acceleration du that the base adds to the one it desires, at every control perio
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -15,14 +16,11 @@ from numpy.typing import NDArray
 
 from artde_gym.evaluation.identity import digest
 from artde_gym.registration import make_controller
-from baselines.coupling import Coupling
-from baselines.ojas import OjasCoupling
-from baselines.q450 import Q450Coupling
+from baselines.agent import agent_of
+from baselines.joint_coupling import JointCoupling
 from baselines.recipe import NO_BASE, Recipe
 from controllers.laws.tracking import Array, Memory
 from controllers.policies import Plant, Policy, choose, flatten
-
-_COUPLINGS: dict[str, Callable[[Plant, Recipe, Any], Coupling]] = {"ojas": OjasCoupling, "q450": Q450Coupling}
 
 
 class ResidualMemory(NamedTuple):
@@ -50,10 +48,10 @@ class Residual:
     """
 
     def __init__(self, plant: Plant, base: Policy, recipe: Recipe) -> None:
-        self.recipe = recipe
         self.base = base
         self.periods = recipe.periods(plant.control_period)
-        self.coupling = _COUPLINGS[plant.robot](plant, recipe, base.gains)
+        self.recipe = recipe if recipe.hold else dataclasses.replace(recipe, hold=self.periods * plant.control_period)
+        self.coupling = (agent_of(plant.robot).coupling or JointCoupling)(plant, self.recipe, base.gains)
         self.features, self.actions = self.coupling.features, self.coupling.actions
 
     @classmethod

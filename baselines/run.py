@@ -127,8 +127,10 @@ class Run:
 
     @property
     def batched(self) -> bool:
-        """Whether all environments are one batch: quadrotors always, bipeds in MuJoCo."""
+        """Whether all environments are one batch: of the task's engine, if it names one."""
         engine = self.task.batch_engine
+        if self.task.batch is None:
+            return False
         return engine is None or environment_kwargs(self.training).get("engine") == engine
 
     @property
@@ -200,7 +202,7 @@ class Run:
         training, kwargs = self.training, environment_kwargs(self.training)
         return Saved(
             f"{training.recipe.base}+{LABELS.get(training.algo, training.algo)}",
-            training.recipe,
+            residual.recipe,
             network,
             layout_hash(residual.features),
             tuple(residual.actions),

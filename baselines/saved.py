@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from artde_gym.errors import ArtdeGymError, OptionError, UnknownNameError, among
-from artde_gym.multibody.spec import RobotSpec
-from artde_gym.robots.ojas import task as biped_task
-from artde_gym.robots.ojas.model import ActuatorInertia, ojas
-from artde_gym.robots.q450 import task as quadrotor_task
-from artde_gym.robots.q450.model import q450
+from artde_gym.evaluation.environments import ours, single
+from artde_gym.layout import Layout
+from baselines.agent import agent_of
 from baselines.errors import PolicyFileError
 from baselines.policy_file import DESCRIPTION, Saved, layout_hash, read
 from baselines.residual import Residual, ResidualPolicy
@@ -38,7 +37,7 @@ def load(path: str | Path, env: Any = None) -> ResidualPolicy:
     if not (folder / DESCRIPTION).exists() and (folder / EXPORT / DESCRIPTION).exists():
         folder = folder / EXPORT
     saved = read(folder)
-    return _policy(saved, _Trained(saved) if env is None else env)
+    return _policy(saved, _trained_in(saved) if env is None else env)
 
 
 def make_shipped(env: Any, *, policies: dict[str, str]) -> ResidualPolicy:
@@ -62,31 +61,37 @@ def make_shipped(env: Any, *, policies: dict[str, str]) -> ResidualPolicy:
     return load(SHIPPED / policies[env_id], env)
 
 
+def _trained_in(saved: Saved) -> Any:
+    """The environment of a policy's training, built only if its robot does not tell what the policy has to know."""
+    agent = agent_of(saved.recipe.robot)
+    if agent.observation is not None and agent.action is not None:
+        if saved.nominal not in agent.nominal:
+            raise PolicyFileError("nominal_robot", saved.nominal, ", ".join(map(repr, agent.nominal)))
+        return _Trained(saved, agent.observation, agent.action, agent.nominal[saved.nominal]())
+    env_id, kwargs = saved.about.get("env_id"), saved.about.get("env_kwargs")
+    if env_id not in ours() or not isinstance(kwargs, dict):  # never a "module:id", which would be imported
+        raise PolicyFileError("about: env_id", env_id, among(env_id, ours()))
+    return single(env_id, json.dumps(kwargs))
+
+
 class _Trained:
     """What a policy has to know of the environment of its training, without building it."""
 
-    def __init__(self, saved: Saved) -> None:
-        task = {"ojas": biped_task, "q450": quadrotor_task}[saved.recipe.robot]
+    def __init__(self, saved: Saved, observation: Layout, action: Layout, nominal_robot: Any) -> None:
         self.robot_name = saved.recipe.robot
-        self.observation_layout, self.action_layout = task.OBSERVATION, task.ACTION
+        self.observation_layout, self.action_layout = observation, action
         self.control_period = saved.control_period
-        self.nominal_robot = _nominal_robot(self.robot_name, saved.nominal)
+        self.nominal_robot = nominal_robot
 
     @property
     def unwrapped(self) -> _Trained:
         return self
 
 
-def _nominal_robot(robot: str, name: str) -> RobotSpec:
-    known = {"q450": q450} if robot == "q450" else {f"ojas {kind}": ojas for kind in get_args(ActuatorInertia)}
-    if name not in known:
-        raise PolicyFileError("nominal_robot", name, ", ".join(map(repr, known)))
-    return known[name](*name.split()[1:])
-
-
 def nominal_name(robot: str, env_kwargs: dict[str, Any]) -> str:
     """How a policy's file names the nominal robot of an environment."""
-    return robot if robot == "q450" else f"{robot} {env_kwargs.get('actuator_inertia', 'rotor')}"
+    name = agent_of(robot).nominal_name
+    return robot if name is None else name(env_kwargs)
 
 
 def _policy(saved: Saved, env: Any) -> ResidualPolicy:

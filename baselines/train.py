@@ -100,7 +100,8 @@ class Trainer:
         words = np.random.SeedSequence([run.training.seed, self.number]).generate_state(2, np.uint64).tolist()
         set_random_seed(words[0] % 2**32)  # NumPy's old generator takes no more
         self.env.seed(words[1])
-        self.env.set_options({"disturbances": run.task.training(self.level)})
+        disturbances = run.task.training(self.level)
+        self.env.set_options({} if disturbances is None else {"disturbances": disturbances})
         model._last_obs = None  # so that `learn` resets the environments
         watcher, began = _Watcher(self._report), time.perf_counter()
         wanted = min(self.interval, run.training.steps - self.steps)

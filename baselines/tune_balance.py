@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from artde_gym.arguments import reading
 from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.store import write_atomically
+from baselines.agent import agent_of
 from baselines.balance import GAINS, balance_network
 from baselines.errors import TrainingError
 from baselines.network import Network
+from baselines.ojas_tasks import push
 from baselines.run import Progress, Run, Training, environment_kwargs
-from baselines.tasks import push
 from baselines.vec_env import ResidualVecEnv, batched
 
 POPULATION = 14
@@ -39,7 +40,7 @@ def tune(training: Training, out: str | Path, on_progress: Callable[[Progress], 
     Raises:
         TrainingError: if `out` holds a run of another configuration, the robot has no such law, or the engine no batch.
     """
-    if training.recipe.robot != "ojas" or training.recipe.channel == "joints":
+    if training.recipe.channel not in agent_of(training.recipe.robot).balanced:
         raise TrainingError("recipe", training.recipe, "the biped's synergies, of which the law has gains")
     run = Run(training, Path(out), on_progress)
     if not run.batched:

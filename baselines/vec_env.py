@@ -126,5 +126,5 @@ class ResidualVecEnv(VecEnv):
 def batched(env_id: str, recipe: Recipe, count: int, kwargs: Mapping[str, Any]) -> ResidualVecEnv:
     """So many of an environment, built with `kwargs`, in one batch with an agent's action for each."""
     own = {name: value for name, value in kwargs.items() if name != "engine"}  # a batch is an engine
-    own |= task(env_id).batch
+    own |= task(env_id).batch or {}
     return ResidualVecEnv(gym.make_vec(env_id, count, vectorization_mode="vector_entry_point", **own), recipe)

@@ -21,9 +21,9 @@ def make(name: str, env: Any, **overrides: Any) -> Any:
         name: "tde", "atde", "artde", "artde-robust", "pid", "tde+c", "tde+kd", for the biped "computed-torque", for the
             quadrotor "asmc", "geometric", "indi", or whatever was given to `artde_gym.register_controller`.
         env: the environment that it will drive; its robot decides which policy the name stands for.
-        overrides: gains in place of the preset's, and `preset="thesis"`, `"robust"`, ...; for the biped's laws also
-            `velocity_cutoff_hz` and `time_base`, see `controllers.biped.make_biped`; of the quadrotor's two loops
-            a gain has the suffix `_p` (position) or `_q` (attitude).
+        overrides: gains in place of the preset's, and `preset="thesis"`, `"robust"`, ...; for laws on all joints also
+            `velocity_cutoff_hz` and `time_base`, see `controllers.joint_space.make_joint_space`; of the quadrotor's two
+            loops a gain has the suffix `_p` (position) or `_q` (attitude).
 
     Raises:
         UnknownNameError: for a controller that nobody registered or that the robot does not have, or an unknown preset.

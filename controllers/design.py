@@ -7,47 +7,26 @@ motion. At the sampling period L the law then holds a joint with the stiffness K
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, NamedTuple
+import inspect
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from artde_gym.errors import UnknownNameError, among
-from artde_gym.multibody.dynamics import RigidBodyTree, joint_space_inertia
-from artde_gym.robots.ojas.model import ActuatorInertia, ojas
-from artde_gym.robots.ojas.walking import walking_pattern
-from artde_gym.robots.q450.model import q450
+from artde_gym.errors import OptionError, UnknownNameError, among
+from controllers.drive import DRIVES, Drive
 from controllers.law_table import LAWS
 from controllers.laws.tde import TdeGains
 from controllers.laws.tracking import check_positive_number
 from controllers.laws.validity import largest_joint_m_bar, largest_m_bar, tde_eigenvalues
-from controllers.presets import LOOPS, PRESETS, preset_gains
+from controllers.loop import Loop
+from controllers.presets import LOOPS, preset_gains
 
 Array = NDArray[np.floating[Any]]
 
 DELAYED = ("tde", "atde", "artde", "tde+c", "tde+kd")
 """Laws that estimate by time delay."""
-PERIODS = {"ojas": 0.001, "q450": 0.015}
-"""Robot -> the sampling period (s) of its environments where nothing else is asked for."""
-_WALKED, _SAMPLED = 8.0, 0.01  # s, of the reference walk and between its samples
-
-
-class Loop(NamedTuple):
-    """A part of a robot that one law drives, along its reference.
-
-    Attributes:
-        name: "joints", "position" or "attitude".
-        joints: names of its coordinates.
-        unit: of its inertia.
-        time: of the reference (k,) (s).
-        inertia: that the law meets (k, n, n).
-    """
-
-    name: str
-    joints: tuple[str, ...]
-    unit: str
-    time: Array
-    inertia: Array
 
 
 @dataclasses.dataclass(frozen=True)
@@ -128,28 +107,30 @@ class Design:
         }
 
 
-def loops(
-    robot: str, actuator_inertia: ActuatorInertia = "rotor", speed: float = 0.1, step_duration: float = 1.0
-) -> list[Loop]:
-    """List the loops of a robot; of the biped along a walk, of the quadrotor those of the bare vehicle.
+def loops(robot: str, **motion: Any) -> list[Loop]:
+    """List the loops of a robot along its reference.
+
+    Args:
+        robot: that has a drive with such a model.
+        motion: arguments of the reference and the model; of the biped `actuator_inertia`, `speed`, `step_duration`.
 
     Raises:
-        UnknownNameError: for an unknown robot.
-        OptionError: for an argument of the walk out of range.
+        UnknownNameError: for any other robot.
+        OptionError: for an argument that the robot's motion does not have, or out of range.
     """
-    if robot == "ojas":
-        pattern = walking_pattern(speed, step_duration, _WALKED, _SAMPLED)
-        spec = ojas(actuator_inertia)
-        inertia = joint_space_inertia(RigidBodyTree(spec).mass_matrix(pattern.q))
-        return [Loop("joints", spec.actuated, "kg m^2", _SAMPLED * np.arange(len(inertia)), inertia)]
-    if robot != "q450":
-        raise UnknownNameError("robot", robot, among(robot, PERIODS))
-    vehicle = q450()
-    body, still = np.diag(vehicle.base.inertia), np.zeros(1)
-    return [
-        Loop("position", ("x", "y", "z"), "kg", still, vehicle.mass * np.eye(3)[None]),
-        Loop("attitude", ("roll", "pitch", "yaw"), "kg m^2", still, body[None]),
-    ]
+    able = designed()
+    if robot not in able:
+        raise UnknownNameError("robot", robot, among(robot, able))
+    known = inspect.signature(able[robot]).parameters
+    for name in motion:
+        if name not in known:
+            raise OptionError(f"argument of {robot!r}", name, among(name, known) if known else "none: it takes none")
+    return able[robot](**motion)
+
+
+def designed() -> dict[str, Callable[..., list[Loop]]]:
+    """Robots with loops to be judged, and what lists those."""
+    return {robot: drive.loops for robot, drive in DRIVES.items() if drive.loops is not None}
 
 
 def judge(loop: Loop, gains: TdeGains, period: float) -> Design:
@@ -170,42 +151,37 @@ def design(
     preset: str | None = None,
     period: float | None = None,
     *,
-    actuator_inertia: ActuatorInertia = "rotor",
-    speed: float = 0.1,
-    step_duration: float = 1.0,
     gains: dict[str, Any] | None = None,
+    **motion: Any,
 ) -> list[Design]:
     """Work out, loop by loop, how large m_bar may be and how stiff the chosen gains are.
 
     Args:
-        robot: "ojas" or "q450".
+        robot: that has a drive with a model, as `loops`.
         law: one of `DELAYED`.
         preset: name of its gains; None for the law's default.
         period: L that the law divides by (s); None for the robot's usual sampling period.
-        actuator_inertia, speed, step_duration: of the biped's walk.
         gains: in place of the preset's.
+        motion: see `loops`.
 
     Raises:
         UnknownNameError: for an unknown robot or preset, or a law without a time-delay estimate.
         GainError: for a gain or period that is not allowed.
-        OptionError: for an argument of the walk out of range.
+        OptionError: for an argument of the motion that is not allowed.
     """
-    if robot not in PERIODS:
-        raise UnknownNameError("robot", robot, among(robot, PERIODS))
+    found = loops(robot, **motion)
     if law not in DELAYED:
         raise UnknownNameError("law with a time-delay estimate", law, among(law, DELAYED))
-    found = loops(robot, actuator_inertia, speed, step_duration)
     chosen = preset_gains(robot, law, preset, len(found[0].joints), gains or {})
-    length = PERIODS[robot] if period is None else period
+    length = DRIVES[robot].period if period is None else period
     return [judge(loop, _of_loop(chosen, loop, law, length), length) for loop in found]
 
 
-def preset_designs(loop: Loop, robot: str, *, tuned: bool) -> list[Design]:
+def preset_designs(loop: Loop, drive: Drive, *, tuned: bool) -> list[Design]:
     """Judge a loop at all presets of laws that estimate by time delay: those that tuning found, or the others."""
-    period = PERIODS[robot]
     return [
-        judge(loop, _of_loop(entry.gains, loop, law, period), period)
-        for (law, preset), entry in PRESETS[robot].items()
+        judge(loop, _of_loop(entry.gains, loop, law, drive.period), drive.period)
+        for (law, preset), entry in drive.presets.items()
         if law in DELAYED and (preset == "tuned") == tuned
     ]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from controllers.laws.artde import artde, artde_start
+from controllers.laws.artde import ArtdeGains, artde, artde_start
 from controllers.laws.asmc import AsmcGains, asmc, asmc_start
-from controllers.laws.atde import atde, atde_start
+from controllers.laws.atde import AtdeGains, atde, atde_start
 from controllers.laws.indi import IndiGains, indi, indi_start
 from controllers.laws.pid import PidGains, identity_gains, pid, pid_start
 from controllers.laws.positional_pid import PositionalPidGains, positional_pid, positional_pid_start
@@ -64,6 +64,18 @@ def _same(gains: Any, _period: float) -> Any:
 def _equivalent(gains: ConstantGains, _period: float) -> TdeGains:
     return equivalent_gains(gains)
 
+
+GAINS: dict[str, type[Any]] = {
+    "tde": TdeGains,
+    "atde": AtdeGains,
+    "artde": ArtdeGains,
+    "pid": TdeGains,
+    "tde+c": ConstantGains,
+    "tde+kd": ConstantGains,
+    "asmc": AsmcGains,
+    "indi": IndiGains,
+}
+"""Law -> the gains that drive joints with it."""
 
 LAWS: dict[str, Entry] = {
     "tde": Entry(Law(_tde_start, tde), _same),

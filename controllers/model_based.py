@@ -40,7 +40,7 @@ def make_computed_torque(env: Any, *, preset: str | None = None, **gains: Any) -
     """The policy for a biped environment, at preset gains with some replaced.
 
     Raises:
-        UnknownNameError, GainError: as `controllers.biped.make_biped`.
+        UnknownNameError, GainError: as `controllers.joint_space.make_joint_space`.
     """
     plant = Plant.of(env)
     return ComputedTorquePolicy(plant, preset_gains(plant.robot, "computed-torque", preset, plant.action.size, gains))

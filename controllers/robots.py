@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from artde_gym.errors import UnknownNameError, among
 from artde_gym.registration import GainRange
-from controllers.biped import make_biped
+from controllers.drive import DRIVES
+from controllers.joint_space import make_joint_space
 from controllers.policies import Plant, Policy
 from controllers.presets import gain_ranges
-from controllers.quadrotor import make_quadrotor
-
-_MAKERS = {"ojas": make_biped, "q450": make_quadrotor}
 
 
 def make_for_robot(env: Any, *, law: str, **options: Any) -> Policy:
@@ -20,16 +17,16 @@ def make_for_robot(env: Any, *, law: str, **options: Any) -> Policy:
     Args:
         env: the environment that it will drive.
         law: name of the law.
-        options: of the robot's own function in `controllers.biped` or `controllers.quadrotor`.
+        options: of `Drive.make` of the robot: `controllers.joint_space.make_joint_space`,
+            `controllers.quadrotor.make_quadrotor`, or a plug-in's own.
 
     Raises:
-        UnknownNameError: for a robot that nobody drives, a law that the robot does not have, or an unknown preset.
+        UnknownNameError: for a law that the robot does not have, or an unknown preset.
         GainError: for an unknown gain or a value that is not allowed.
     """
     robot = Plant.of(env).robot
-    if robot not in _MAKERS:
-        raise UnknownNameError("robot", robot, among(robot, _MAKERS))
-    return _MAKERS[robot](env, law=law, **options)
+    make = DRIVES[robot].make if robot in DRIVES else None
+    return (make or make_joint_space)(env, law=law, **options)
 
 
 def search_space(env: Any, *, law: str, preset: str | None = None) -> dict[str, GainRange]:

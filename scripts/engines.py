@@ -14,12 +14,12 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pybullet as bullet
-from artde_gym.robots.ojas.thesis import JOINTS
 
 import controllers
 from artde_gym.evaluation import Result, evaluate, statistics
 from artde_gym.evaluation.rollout import run_episode
 from artde_gym.evaluation.seeds import episode_seed
+from artde_gym.robots.ojas.thesis import JOINTS
 from artde_gym.scenarios import SCENARIOS
 
 ENGINES = ("bullet", "mujoco")

@@ -57,5 +57,5 @@ def on_post_build(config: Any) -> None:
 
 def _source(path: str) -> str:
     text = (ROOT / path).read_text(encoding="utf-8")
-    language = {".py": "python", ".cff": "yaml"}[Path(path).suffix]
+    language = {".py": "python", ".cff": "yaml", ".toml": "toml"}[Path(path).suffix]
     return f'``` {{ .{language} title="{path}" }}\n{text}```'

@@ -17,7 +17,8 @@ from artde_gym.kit import ROBOTS
 from artde_gym.registration import registered_controllers
 from artde_gym.scenarios import SCENARIOS
 from artde_gym.sim.factory import ENGINES
-from controllers.presets import LOOPS, PRESETS, named_gains
+from controllers.drive import DRIVES
+from controllers.presets import LOOPS, named_gains
 from controllers.presets.units import unit_of
 
 Entries = list[dict[str, Any]]
@@ -62,7 +63,8 @@ def controllers() -> Entries:
         law, wanted = spec.kwargs.get("law", name), spec.kwargs.get("preset")
         presets: Entries = []
         own_gains: dict[str, None] = {}
-        for robot, table in PRESETS.items():
+        for robot, drive in DRIVES.items():
+            table = drive.presets
             names = [preset for of, preset in table if of == law]
             for preset in names:
                 entry = table[law, preset]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -16,42 +16,39 @@ from artde_gym.arguments import number
 from artde_gym.cli.arguments import json_object
 from artde_gym.errors import OptionError
 from artde_gym.evaluation.store import write_atomically
+from artde_gym.kit import ROBOTS
 from artde_gym.palette import LOOKS
 from artde_gym.report.chart import Axis, Chart
-from controllers.design import DELAYED, Design
+from controllers.design import DELAYED, Design, designed
 from controllers.design import design as work_out
 
-ROBOTS = {"biped": "ojas", "quadrotor": "q450"}
+NAMES = {ROBOTS[robot].title: robot for robot in designed() if robot in ROBOTS}
+"""Robots by their titles."""
 
 
 def design(
-    robot: Annotated[str, typer.Option(help=f"{' or '.join(ROBOTS)}.")] = "biped",
+    robot: Annotated[str, typer.Option(help=f"{' or '.join(NAMES)}.")] = "biped",
     law: Annotated[str, typer.Option(help=f"{', '.join(DELAYED)}.")] = "tde",
     preset: Annotated[str | None, typer.Option(help="Of the law's gains; see `list controllers`.")] = None,
     gains: Annotated[str | None, typer.Option(help='JSON, in place of the preset\'s, e.g. {"m_bar": 0.08}.')] = None,
     period: Annotated[float | None, typer.Option(help="Sampling period L (s). Default: the robot's.")] = None,
-    actuator_inertia: Annotated[str, typer.Option(help="Of the biped: rotor, lumped or none.")] = "rotor",
-    speed: Annotated[float, typer.Option(help="Of the biped's walk (m/s).")] = 0.1,
-    step_duration: Annotated[float, typer.Option(help="Of the biped's walk (s).")] = 1.0,
+    actuator_inertia: Annotated[
+        str | None, typer.Option(help="Of the biped: rotor, lumped or none. Default: rotor.")
+    ] = None,
+    speed: Annotated[float | None, typer.Option(help="Of the biped's walk (m/s). Default: 0.1.")] = None,
+    step_duration: Annotated[float | None, typer.Option(help="Of the biped's walk (s). Default: 1.")] = None,
+    motion: Annotated[str | None, typer.Option(help="JSON, arguments of another robot's motion.")] = None,
     figure: Annotated[Path | None, typer.Option(help="SVG of the limit along the reference, one file a loop.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Print the valid range of m_bar, the joint stiffness K_d m_bar / L, and the room up to the edge."""
-    if robot not in ROBOTS:
-        raise OptionError("robot", robot, ", ".join(map(repr, ROBOTS)))
-    model: Literal["rotor", "lumped", "none"] = actuator_inertia  # pyright: ignore[reportAssignmentType]  # checked there
+    if robot not in NAMES:
+        raise OptionError("robot", robot, ", ".join(map(repr, NAMES)))
     if period is not None:
         number("period", period, 1e-6, 10.0, "1e-6 to 10 s")
-    found = work_out(
-        ROBOTS[robot],
-        law,
-        preset,
-        period,
-        actuator_inertia=model,
-        speed=speed,
-        step_duration=step_duration,
-        gains=json_object("gains", gains),
-    )
+    walk = {"actuator_inertia": actuator_inertia, "speed": speed, "step_duration": step_duration}
+    given = {name: value for name, value in walk.items() if value is not None} | json_object("--motion", motion)
+    found = work_out(NAMES[robot], law, preset, period, gains=json_object("gains", gains), **given)
     if figure is not None:
         if not figure.name:
             raise OptionError("figure", str(figure), "the path of a file, such as m_bar.svg")

@@ -19,6 +19,7 @@ from artde_gym.cli.arguments import (
     json_object,
     optional_json,
 )
+from artde_gym.errors import OptionError
 from artde_gym.registration import make_controller
 
 
@@ -44,6 +45,8 @@ def play(
     window = open_window()
     try:
         plant = single(cell.env_id, json.dumps(cell.kwargs))
+        if not hasattr(plant.unwrapped, "engine"):
+            raise OptionError("env", cell.env_id, "an environment with a physics engine, which a window can show")
         policy = make_controller(controller, plant, **overrides)
         window.load(plant.unwrapped.engine.spec)
         print("\n".join((*HELP, "A click pushes away from you, at the nearest place on the robot.")))

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from artde_gym.multibody.spec import Vector
-from artde_gym.sim.engine import World
 
 NEVER = 2**62  # steps
 EVENTS = PUSH_BEGINS, PUSH_ENDS, ATTACHED, DROPPED = "push_begins", "push_ends", "payload_attached", "payload_dropped"
+
+
+class Loaded(Protocol):
+    """What a schedule acts on: an engine's `World`, or the dynamics of a plug-in's own."""
+
+    def push(self, site: str, force: Vector) -> None: ...
+    def attach_payload(self, mass: float, position: Vector) -> None: ...
+    def release_payload(self) -> None: ...
 
 
 class Push(NamedTuple):
@@ -46,7 +53,7 @@ class Schedule:
                 self._add(round(self._payload["attach"] / time_step), ATTACHED)
             self._add(round(self._payload["drop"] / time_step), DROPPED)
 
-    def start(self, world: World) -> None:
+    def start(self, world: Loaded) -> None:
         """Bring about what is there before the first step."""
         if self._payload.get("attach") == 0 and self._payload["drop"] > 0:
             self._attach(world)
@@ -80,7 +87,7 @@ class Schedule:
         """The pushes that act during a step."""
         return [push for push in self._pushes if push.first <= step < push.end]
 
-    def apply(self, step: int, world: World) -> list[str]:
+    def apply(self, step: int, world: Loaded) -> list[str]:
         """Bring about what belongs to a step; returns which of `EVENTS` happen with it."""
         events = self._changes.get(step, [])
         for event in events:
@@ -92,7 +99,7 @@ class Schedule:
             world.push(push.site, push.force)
         return events
 
-    def _attach(self, world: World) -> None:
+    def _attach(self, world: Loaded) -> None:
         x, y, z = self._payload["position"]
         world.attach_payload(self._payload["mass"], (x, y, z))
 

@@ -14,22 +14,27 @@ import numpy as np
 from gymnasium.utils.env_checker import check_env
 
 import artde_gym  # noqa: F401  # registers the environments
+from artde_gym.disturbances import KINDS
 from artde_gym.doctor.outcome import Outcome
-from artde_gym.evaluation.environments import ours, vector
+from artde_gym.evaluation.environments import arguments_of, ours, robot_of, vector
 from artde_gym.sim.factory import ENGINES, resolve_engine
 
-ARGUMENTS: dict[str, Any] = {"duration": 3.0, "disturbances": {"payload": 0.3}}
+DURATION, PAYLOAD = 3.0, {"payload": 0.3}  # s, kg
 IN_SI_UNITS = r".*(symmetric and normalized|recommend using np.float32)"
 """Warnings that are no findings: actions are in Nm and N, and float64, by design; RescaleAction gives [-1, 1]."""
 REMEDY = "pip install -c constraints.txt --force-reinstall . : the tests pass with these versions"
 
 
 def in_engine(name: str) -> list[Outcome]:
-    """Run Gymnasium's checker on every environment in an engine, where it is there."""
+    """Run Gymnasium's checker on every environment in an engine, where it is there.
+
+    Environments that know no engine are checked with the default one's.
+    """
+    default = resolve_engine(None)
     if missing := ENGINES[name].missing():
-        default = ENGINES[resolve_engine(None)].title
-        return [Outcome(ENGINES[name].title, "missing", f"the default engine is {default}", missing)]
-    return [_checked(env_id, name, _gymnasium) for env_id in ours()]
+        return [Outcome(ENGINES[name].title, "missing", f"the default engine is {ENGINES[default].title}", missing)]
+    chosen = [env_id for env_id in ours() if name == default or "engine" in arguments_of(env_id)]
+    return [_checked(env_id, name, _gymnasium) for env_id in chosen]
 
 
 def stable_baselines3() -> list[Outcome]:
@@ -46,7 +51,7 @@ def batch() -> list[Outcome]:
     for name in ours():
         if gym.spec(name).vector_entry_point is None:
             continue
-        vectors: list[Any] = [vector(name, json.dumps(ARGUMENTS), size) for size in (8, 1)]
+        vectors: list[Any] = [vector(name, json.dumps(_arguments(name)), size) for size in (8, 1)]
         many, one = vectors
         action = many.action_space.low * 0.5 + many.action_space.high * 0.5
         many.reset(seed=[7, *range(1, 8)])
@@ -66,9 +71,17 @@ def _gymnasium(env: Any) -> None:
     check_env(env, skip_render_check=True)  # pictures have a check of their own
 
 
+def _arguments(name: str, engine: str | None = None) -> dict[str, Any]:
+    """Arguments for a short episode with a payload, as far as the environment takes them."""
+    wanted: dict[str, Any] = {"duration": DURATION, "engine": engine} if engine else {"duration": DURATION}
+    if KINDS["payload"].honored_by(robot_of(name)):
+        wanted["disturbances"] = PAYLOAD
+    return {argument: value for argument, value in wanted.items() if argument in arguments_of(name)}
+
+
 def _checked(name: str, engine: str, checker: Callable[[Any], None]) -> Outcome:
     try:
-        env = gym.make(name, disable_env_checker=True, engine=engine, **ARGUMENTS)
+        env = gym.make(name, disable_env_checker=True, **_arguments(name, engine))
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             warnings.filterwarnings("ignore", message=IN_SI_UNITS)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from artde_gym.arrays import Array
 from artde_gym.evaluation.console import REFERENCE
 from artde_gym.evaluation.environments import single
 from artde_gym.multibody.dynamics import RigidBodyTree, joint_space_inertia
+from artde_gym.multibody.spec import RobotSpec
 from artde_gym.palette import OTHERS
 from artde_gym.registration import make_controller, registered_controllers
 from artde_gym.report.chart import Axis, Chart
@@ -35,7 +36,7 @@ class Laws:
         self.gains = functools.cache(self._find_gains)  # scenario -> the same dict, found once a report
 
     def robot(self, scenario: str) -> Any:
-        """The nominal robot (`RobotSpec`)."""
+        """The nominal robot: a `RobotSpec`, or a plug-in's own model."""
         return self._environment(scenario).unwrapped.nominal_robot
 
     def _find_gains(self, scenario: str) -> dict[str, Gains]:
@@ -79,15 +80,18 @@ class Laws:
         if not nominal:
             return []
         robot = self.robot(scenario)
-        if not robot.actuated:
+        if isinstance(robot, RobotSpec) and not robot.actuated:
             return [self._rigid_body(robot, nominal)]
+        inertia_at = inertia_of(robot)
+        if inertia_at is None:
+            return []
         episode = self._run.episode(scenario)
         if episode is None:
             return []
         signals = next(iter(episode.signals.values()))
         q = signals.fields["q_ref"][:: max(1, len(signals.time) // SAMPLES)].astype(np.float64)
         time = signals.time[:: max(1, len(signals.time) // SAMPLES)]
-        inertia = joint_space_inertia(RigidBodyTree(robot).mass_matrix(q))
+        inertia = inertia_at(q)
         charts = {}
         for key, names in nominal.items():
             _, m_bar = json.loads(key)
@@ -126,6 +130,17 @@ class Laws:
     def _environment(self, scenario: str) -> Any:
         cell = self._run.cell(scenario)
         return single(cell["env_id"], json.dumps(cell["kwargs"]))
+
+
+def inertia_of(robot: Any) -> Callable[[Array], Array] | None:
+    """Return the joint-space inertia (..., n, n) of a nominal robot as a function of q (..., n); None if it tells none.
+
+    A plug-in's own model may have it as `joint_inertia`.
+    """
+    if isinstance(robot, RobotSpec):
+        tree = RigidBodyTree(robot)
+        return lambda q: joint_space_inertia(tree.mass_matrix(q))
+    return getattr(robot, "joint_inertia", None)
 
 
 def unavailable(error: Exception) -> str:

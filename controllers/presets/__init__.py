@@ -9,16 +9,9 @@ import numpy as np
 
 from artde_gym.errors import UnknownNameError, among
 from artde_gym.registration import GainRange
+from controllers.drive import DRIVES, Preset
+from controllers.law_table import GAINS
 from controllers.laws.errors import GainError
-from controllers.presets.ojas import OJAS, OJAS_RANGES
-from controllers.presets.preset import Preset, Ranges
-from controllers.presets.q450 import Q450, Q450_RANGES
-
-PRESETS: dict[str, dict[tuple[str, str], Preset]] = {"ojas": OJAS, "q450": Q450}
-"""robot -> (law, preset) -> gains; a law's first preset is its default."""
-
-RANGES: dict[str, dict[str, Ranges]] = {"ojas": OJAS_RANGES, "q450": Q450_RANGES}
-"""robot -> law -> where tuning may look for its gains."""
 
 LOOPS = {"position": "p", "attitude": "q"}
 """Fields of a cascade's gains that hold the gains of a loop, and the suffix by which an override names one of those."""
@@ -38,12 +31,15 @@ def preset_gains(robot: str, law: str, preset: str | None, joints: int, override
         UnknownNameError: if the robot has no such law, or the law no such preset.
         GainError: for a gain that the law does not have, or a value that it does not allow.
     """
-    gains = _preset(robot, law, preset).gains
-    flat = named_gains(gains)
-    for name in overrides:
-        if name not in flat:
-            raise GainError(f"of {law!r}", name, among(name, flat))
-    gains = _replaced(gains, overrides)
+    if robot in DRIVES:
+        gains = _preset(robot, law, preset).gains
+        flat = named_gains(gains)
+        for name in overrides:
+            if name not in flat:
+                raise GainError(f"of {law!r}", name, among(name, flat))
+        gains = _replaced(gains, overrides)
+    else:
+        gains = _given(robot, law, preset, overrides)
     for name, value in named_gains(gains).items():
         if np.ndim(value) > 0 and np.shape(value)[0] != joints:
             raise GainError(name, value, f"one number, or one for each of the {joints} joints")
@@ -57,14 +53,33 @@ def gain_ranges(robot: str, law: str, preset: str | None) -> dict[str, GainRange
         UnknownNameError: as `preset_gains`, or for a law whose gains nobody tunes.
     """
     gains = named_gains(_preset(robot, law, preset).gains)
-    known = RANGES[robot]
+    known = DRIVES[robot].ranges
     if law not in known:
         raise UnknownNameError(f"controller of {robot!r} to be tuned", law, among(law, known))
     return {name: GainRange(gains[name], low, high) for name, (low, high) in known[law].items()}
 
 
+def _given(robot: str, law: str, preset: str | None, gains: dict[str, Any]) -> Any:
+    """Gains of a robot without presets, all of them given."""
+    if preset is not None:
+        raise UnknownNameError(f"preset of {law!r} for {robot!r}", preset, "none: the robot has no presets")
+    if law not in GAINS:
+        raise UnknownNameError(f"controller of {robot!r}", law, among(law, GAINS))
+    fields = {field.name: field for field in dataclasses.fields(GAINS[law])}
+    for name in gains:
+        if name not in fields:
+            raise GainError(f"of {law!r}", name, among(name, fields))
+    needed = [name for name, field in fields.items() if field.default is dataclasses.MISSING]
+    if missing := [name for name in needed if name not in gains]:
+        allowed = f"{', '.join(needed)}, all of them: {robot!r} has no presets, for which its plug-in needs a Drive"
+        raise GainError(f"of {law!r} not given", ", ".join(missing), allowed)
+    return GAINS[law](**gains)
+
+
 def _preset(robot: str, law: str, preset: str | None) -> Preset:
-    known = PRESETS.get(robot, {})
+    if robot not in DRIVES:
+        raise UnknownNameError("robot with presets", robot, among(robot, DRIVES))
+    known = DRIVES[robot].presets
     laws = list(dict.fromkeys(name for name, _ in known))
     if law not in laws:
         raise UnknownNameError(f"controller of {robot!r}", law, among(law, laws) if laws else "none yet")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 
+from controllers.drive import Preset, Ranges
 from controllers.laws.artde import ArtdeGains
 from controllers.laws.atde import AtdeGains
 from controllers.laws.computed_torque import ComputedTorqueGains
 from controllers.laws.tde import ConstantGains, TdeGains
-from controllers.presets.preset import Preset, Ranges
 
 _THESIS = "Dantu 2023, section 2.5.2"
 _M_BAR, _K_P, _K_D = 0.042, 25.0, 10.0

@@ -6,6 +6,7 @@ from typing import Any
 
 from artde_gym.multibody.dynamics import GRAVITY
 from artde_gym.robots.q450.model import INERTIA, MASS
+from controllers.drive import Preset, Ranges
 from controllers.laws.artde import ArtdeGains
 from controllers.laws.asmc import AsmcGains
 from controllers.laws.atde import AtdeGains
@@ -15,7 +16,6 @@ from controllers.laws.positional_pid import PositionalPidGains
 from controllers.laws.rigid_attitude import RigidAttitudeGains
 from controllers.laws.tde import ConstantGains, TdeGains
 from controllers.laws.tracking import Gain
-from controllers.presets.preset import Preset, Ranges
 
 _THESIS = "Dantu 2023, section 3.5.1"
 _M_BAR, _J_BAR, _K_P, _K_D = 1.0, 0.015, 10.0, 5.0

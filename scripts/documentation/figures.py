@@ -17,6 +17,7 @@ from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.html import figure
 from artde_gym.robots.ojas.report import loop as joint_loop
 from artde_gym.robots.q450.report import loop as cascade_loop
+from controllers.drive import DRIVES
 from controllers.law_table import LAWS
 from controllers.laws.attitude import attitude_error
 from controllers.laws.computed_torque import ComputedTorqueGains
@@ -25,7 +26,6 @@ from controllers.laws.rigid_attitude import rigid_attitude
 from controllers.laws.tde import ConstantGains, equivalent_gains
 from controllers.laws.tracking import Signals, components
 from controllers.laws.vectors import joined
-from controllers.presets import PRESETS
 from documentation.architecture import rooms
 from documentation.plant import ARM, DURATION, LIFT, LOADED, PUSHED, Plant, Run, modelled, simulate
 
@@ -176,7 +176,7 @@ def computed() -> str:
 
 def geometric() -> str:
     """A rigid body turns back from a tilt about a skew axis."""
-    gains = PRESETS["q450"]["geometric", "hand"].gains.attitude
+    gains = DRIVES["q450"].presets["geometric", "hand"].gains.attitude
     period, count = LIFT_PERIOD, round(2.0 / LIFT_PERIOD)
     time = period * np.arange(count)
     names = {f"{start} deg": start for start in STARTS}
@@ -230,7 +230,9 @@ FIGURES: dict[str, Callable[[], str]] = {
 
 def gains_of(robot: str, law: str, preset: str | None = None) -> Any:
     """Gains of a preset; a law's first one by default."""
-    return next(entry.gains for (own, name), entry in PRESETS[robot].items() if own == law and preset in (None, name))
+    return next(
+        entry.gains for (own, name), entry in DRIVES[robot].presets.items() if own == law and preset in (None, name)
+    )
 
 
 @functools.cache

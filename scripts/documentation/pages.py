@@ -15,7 +15,7 @@ import artde_gym  # noqa: F401  # registers the environments
 from artde_gym.evaluation.environments import ours, robot_of
 from artde_gym.registration import registered_controllers
 from artde_gym.scenarios import SCENARIOS
-from controllers.presets import PRESETS
+from controllers.drive import DRIVES
 
 ROOT = Path(__file__).parents[2]
 RAISES = re.compile(r"^Raises:\n((?:    .*\n?)+)", re.MULTILINE)
@@ -88,7 +88,7 @@ def _presets(robot: str) -> str:
     rows = ["| controller | what it is | preset | source of its gains |", "|---|---|---|---|"]
     rows += [
         f"| `{law}` | {texts.pop(law, '')} | `{preset}` | {entry.source} |"
-        for (law, preset), entry in PRESETS[robot].items()
+        for (law, preset), entry in DRIVES[robot].presets.items()
     ]
     return "\n".join(rows)
 

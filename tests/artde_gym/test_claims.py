@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from artde_gym.robots.ojas.thesis import JOINTS
-from artde_gym.robots.q450.thesis import ATTITUDE, POSITION, REPORTED
 from rich.console import Console
 
 from artde_gym.errors import OptionError
 from artde_gym.evaluation import Result, statistics
 from artde_gym.evaluation.console import print_claims
+from artde_gym.robots.ojas.thesis import JOINTS
+from artde_gym.robots.q450.thesis import ATTITUDE, POSITION, REPORTED
 from artde_gym.scenarios import SCENARIOS
 from artde_gym.studies.reproduce.claims import (
     CLAIMS,

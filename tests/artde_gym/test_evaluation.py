@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from artde_gym.robots.ojas.thesis import JOINTS, REPORTED
 from rich.console import Console
 from typer.testing import CliRunner
 
@@ -26,6 +25,7 @@ from artde_gym.evaluation import Result, evaluate, statistics, thesis
 from artde_gym.evaluation.console import print_result
 from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.evaluation.tasks import Update
+from artde_gym.robots.ojas.thesis import JOINTS, REPORTED
 from artde_gym.robots.q450 import task as quadrotor_task
 from artde_gym.scenarios import SCENARIOS
 from artde_gym.studies import reproduce

@@ -131,13 +131,14 @@ def test_a_variance_below_zero_is_refused(tmp_path: Path) -> None:
 def test_a_damaged_run_is_continued_or_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import torch
 
-    from baselines import tasks
+    from baselines.agent import AGENTS
     from baselines.recipe import Recipe
     from baselines.run import Training
     from baselines.train import train
 
     name = "QuadInfinity-Payload-v0"
-    monkeypatch.setitem(tasks.TASKS, name, dataclasses.replace(tasks.TASKS[name], rollouts=2, episodes=1))
+    tasks = AGENTS["q450"].tasks
+    monkeypatch.setitem(tasks, name, dataclasses.replace(tasks[name], rollouts=2, episodes=1))
     training = Training(
         name, Recipe("q450"), steps=64, envs=4, test_every=1, env_kwargs={"duration": 1.0},
         options={"n_steps": 8, "batch_size": 16},

@@ -55,11 +55,12 @@ def quick(monkeypatch):
     """Small intervals and tests."""
     import dataclasses
 
-    from baselines import run, tasks
+    from baselines import run
     from baselines import train as training_module
+    from baselines.agent import AGENTS
 
-    task = dataclasses.replace(tasks.TASKS[QUADROTOR], rollouts=2, episodes=1)
-    monkeypatch.setitem(tasks.TASKS, QUADROTOR, task)
+    task = dataclasses.replace(AGENTS["q450"].tasks[QUADROTOR], rollouts=2, episodes=1)
+    monkeypatch.setitem(AGENTS["q450"].tasks, QUADROTOR, task)
     monkeypatch.setattr(training_module, "SAC_INTERVAL", 64)
     assert run.task(QUADROTOR) is task
 

@@ -43,12 +43,14 @@ def tuning(monkeypatch):
     """Small generations."""
     import dataclasses
 
-    from baselines import tasks, tune_balance
+    from baselines import ojas_tasks, tune_balance
+    from baselines.agent import AGENTS
 
-    monkeypatch.setitem(tasks.TASKS, "BipedPush-v0", dataclasses.replace(tasks.TASKS["BipedPush-v0"], episodes=1))
+    tasks = AGENTS["ojas"].tasks
+    monkeypatch.setitem(tasks, "BipedPush-v0", dataclasses.replace(tasks["BipedPush-v0"], episodes=1))
     for name, value in {"POPULATION": 5, "PUSHES": 2, "DURATION": 1.5}.items():
         monkeypatch.setattr(tune_balance, name, value)
-    pushes = [tasks.push({"choice": [20.0, 60.0]}, start={"uniform": [0.1, 0.6]})]
+    pushes = [ojas_tasks.push({"choice": [20.0, 60.0]}, start={"uniform": [0.1, 0.6]})]
     monkeypatch.setattr(tune_balance, "_PUSH", {"push": pushes})
     return tune_balance
 

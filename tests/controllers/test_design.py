@@ -16,7 +16,8 @@ import artde_gym  # noqa: F401  (registers the environments)
 from artde_gym.cli import app
 from artde_gym.errors import ArtdeGymError
 from controllers import GainError
-from controllers.design import PERIODS, design, judge, loops
+from controllers.design import design, judge, loops
+from controllers.drive import DRIVES
 from controllers.laws.tde import TdeGains
 from controllers.laws.validity import largest_joint_m_bar, largest_m_bar, tde_eigenvalues, tde_is_valid
 
@@ -82,7 +83,7 @@ def test_the_edge_is_that_of_the_validity_check() -> None:
 def test_periods_are_those_of_the_environments() -> None:
     for name in ("BipedWalk-Payload-v0", "QuadInfinity-Payload-v0"):
         env: Any = gym.make(name, disable_env_checker=True).unwrapped
-        assert PERIODS[env.robot_name] == env.control_period
+        assert DRIVES[env.robot_name].period == env.control_period
         env.close()
 
 

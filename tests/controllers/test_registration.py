@@ -132,4 +132,3 @@ def test_names_of_this_project_are_taken(registry):
     assert registration.registered_controllers() == before
     for _ in range(2):  # of one's own, as a notebook's cell that is run again
         artde_gym.register_controller("own", "somewhere:else")
-    registration.register_laws()

@@ -1,4 +1,4 @@
-"""The biped's policies: one law for all joints."""
+"""Joint-space policies: one law for all joints of a robot."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class LawPolicy(TrackingPolicy):
         return self._law.step(self.gains, memory, signals, self._period)
 
 
-def make_biped(
+def make_joint_space(
     env: Any,
     *,
     law: str,
@@ -39,17 +39,17 @@ def make_biped(
     time_base: float = 1.0,
     **gains: Any,
 ) -> TrackingPolicy:
-    """The policy of a law for a biped's environment, at preset gains with some replaced.
+    """Build the policy of a law on all joints, at preset gains with some replaced.
 
     Args:
-        env: the environment that it will drive.
+        env: the environment that it will drive; its observation has the fields of `controllers.laws.tracking.Signals`.
         law: name of the law.
         preset: name of its gains; None for the law's default.
         velocity_cutoff_hz: with a number, velocities are estimated from the observed angles by a low-pass of this
             bandwidth, as behind encoders; without, the observed velocities are used.
         time_base: the period L that the law divides by, over the true one; 0.5 halves it, as if the law believed in
             twice the sampling rate.
-        gains: in place of the preset's.
+        gains: in place of the preset's; of a robot without presets all that the law has no default for.
 
     Raises:
         UnknownNameError: for a law that the robot does not have, or an unknown preset.

@@ -1,0 +1,54 @@
+"""Everything that `baselines` knows of a robot, as one frozen object that a plug-in brings."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from artde_gym.layout import Layout
+from artde_gym.registry import Registry
+from baselines.coupling import Coupling
+from baselines.task import Task
+
+JOINTS = "joints"
+
+
+@dataclasses.dataclass(frozen=True)
+class Agent:
+    """How a residual acts on one robot, and what it is trained on.
+
+    Attributes:
+        robot: by the environments' `robot_name`.
+        coupling: called as coupling(plant, recipe, gains of the base); None for accelerations of the joints, see
+            `baselines.joint_coupling`.
+        channels: what an action may mean, each with its default limit of du (rad/s^2, m/s^2); the first one is the
+            default.
+        hold: default time between two decisions (s); 0 for the control periods that come nearest to 20 ms.
+        tasks: by environment; any other environment has the task of `baselines.tasks.own_task`.
+        balanced: channels for which the linear balance law (`cma-es`) has gains.
+        observation, action: layouts of its environments, by which saved policies are read without one; without them,
+            the environment of the training is built.
+        nominal: name in a policy's file -> builds the nominal robot.
+        nominal_name: arguments of an environment -> name of its nominal robot in a policy's file.
+    """
+
+    robot: str
+    coupling: Callable[[Any, Any, Any], Coupling] | None = None
+    channels: Mapping[str, float] = dataclasses.field(default_factory=lambda: {JOINTS: 25.0})
+    hold: float = 0.0
+    tasks: dict[str, Task] = dataclasses.field(default_factory=dict)
+    balanced: frozenset[str] = frozenset()
+    observation: Layout | None = None
+    action: Layout | None = None
+    nominal: Mapping[str, Callable[[], Any]] = dataclasses.field(default_factory=dict)
+    nominal_name: Callable[[Mapping[str, Any]], str] | None = None
+
+
+AGENTS: Registry[Agent] = Registry("coupling", "artde_gym.couplings", lambda agent: {agent.robot: agent})
+"""All of them by robot."""
+
+
+def agent_of(robot: str) -> Agent:
+    """Return what a robot brings; without, the residual on joint accelerations."""
+    return AGENTS[robot] if robot in AGENTS else Agent(robot)

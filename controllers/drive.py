@@ -1,0 +1,54 @@
+"""Everything that `controllers` knows of a robot, as one frozen object that a plug-in brings."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeAlias
+
+from artde_gym.doctor.outcome import Outcome
+from artde_gym.registry import Registry
+from controllers.loop import Loop
+from controllers.policies import Policy
+
+
+@dataclasses.dataclass(frozen=True)
+class Preset:
+    """Gains (a frozen dataclass of `controllers.laws`) and where they come from."""
+
+    gains: Any
+    source: str
+
+
+Ranges: TypeAlias = dict[str, tuple[float, float]]
+"""Gain, named as an override names it -> lowest and highest value for tuning."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Drive:
+    """How one robot is driven.
+
+    Attributes:
+        robot: by the environments' `robot_name`.
+        presets: (law, preset) -> gains; a law's first preset is its default.
+        ranges: law -> where tuning may look for its gains.
+        make: builds its policies, called as make(env, law=..., **options); None for one law on all joints, see
+            `controllers.joint_space.make_joint_space`.
+        period: sampling period of its environments where nothing else is asked for (s).
+        loops: for `artde-gym design`: lists its parts, each with its inertia along the reference, which the keyword
+            arguments describe; None if the robot has no such model.
+        stability: for `artde-gym doctor`: tells whether time-delay estimation converges at the presets; None to judge
+            all presets of all loops.
+    """
+
+    robot: str
+    presets: Mapping[tuple[str, str], Preset]
+    ranges: Mapping[str, Ranges] = dataclasses.field(default_factory=dict[str, Ranges])
+    make: Callable[..., Policy] | None = None
+    period: float = 0.001
+    loops: Callable[..., list[Loop]] | None = None
+    stability: Callable[[], Sequence[Outcome]] | None = None
+
+
+DRIVES: Registry[Drive] = Registry("drive", "artde_gym.drives", lambda drive: {drive.robot: drive})
+"""All drives by robot."""

@@ -1,0 +1,1 @@
+"""How the robots of this project are driven, one module each."""

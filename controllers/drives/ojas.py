@@ -1,0 +1,50 @@
+"""How Ojas, the biped, is driven: one law on all joints."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+import numpy as np
+
+from artde_gym.doctor.outcome import Outcome
+from artde_gym.multibody.dynamics import RigidBodyTree, joint_space_inertia
+from artde_gym.robots.ojas.model import ActuatorInertia, ojas
+from artde_gym.robots.ojas.walking import walking_pattern
+from controllers.checkup import REMEDY, judged
+from controllers.design import preset_designs
+from controllers.drive import Drive
+from controllers.loop import Loop
+from controllers.presets.ojas import OJAS, OJAS_RANGES
+
+INVALID = "none"
+"""The actuator model that is there to show what happens outside (0, 2)."""
+_WALKED, _SAMPLED = 8.0, 0.01  # s, of the reference walk and between its samples
+
+
+def loops(*, actuator_inertia: ActuatorInertia = "rotor", speed: float = 0.1, step_duration: float = 1.0) -> list[Loop]:
+    """Return the joints along a walk.
+
+    Raises:
+        OptionError: for an argument out of range.
+    """
+    pattern = walking_pattern(speed, step_duration, _WALKED, _SAMPLED)
+    spec = ojas(actuator_inertia)
+    inertia = joint_space_inertia(RigidBodyTree(spec).mass_matrix(pattern.q))
+    return [Loop("joints", spec.actuated, "kg m^2", _SAMPLED * np.arange(len(inertia)), inertia)]
+
+
+def stability() -> list[Outcome]:
+    """Judge the presets with every actuator model, along the walk at the default speed."""
+    return [_judged(actuator) for actuator in get_args(ActuatorInertia)]
+
+
+def _judged(actuator: ActuatorInertia) -> Outcome:
+    (loop,) = loops(actuator_inertia=actuator)
+    valid, found = judged(preset_designs(loop, DRIVE, tuned=False))
+    what = f"biped, actuators {actuator!r}"
+    if actuator == INVALID and not valid:
+        return Outcome(what, "ok", f"{found}: outside, as its documentation says")
+    return Outcome(what, "ok", found) if valid else Outcome(what, "failed", found, REMEDY)
+
+
+DRIVE = Drive("ojas", OJAS, OJAS_RANGES, period=0.001, loops=loops, stability=stability)

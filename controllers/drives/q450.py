@@ -1,0 +1,40 @@
+"""How the Q450, the quadrotor, is driven: a cascade of two laws."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from artde_gym.doctor.outcome import Outcome
+from artde_gym.robots.q450.model import q450
+from controllers.checkup import REMEDY, judged
+from controllers.design import preset_designs
+from controllers.drive import Drive
+from controllers.loop import Loop
+from controllers.presets.q450 import Q450, Q450_RANGES
+from controllers.quadrotor import make_quadrotor
+
+
+def loops() -> list[Loop]:
+    """Return position and attitude of the bare vehicle."""
+    vehicle = q450()
+    body, still = np.diag(vehicle.base.inertia), np.zeros(1)
+    return [
+        Loop("position", ("x", "y", "z"), "kg", still, vehicle.mass * np.eye(3)[None]),
+        Loop("attitude", ("roll", "pitch", "yaw"), "kg m^2", still, body[None]),
+    ]
+
+
+def stability() -> list[Outcome]:
+    """Judge each loop's presets; tuned gains may lie outside, where the rotors' lag leaves room."""
+    return [_judged(loop, tuned) for loop in loops() for tuned in (False, True)]
+
+
+def _judged(loop: Loop, tuned: bool) -> Outcome:
+    what = f"quadrotor, {loop.name}" + (", presets 'tuned'" if tuned else "")
+    valid, found = judged(preset_designs(loop, DRIVE, tuned=tuned))
+    status = "ok" if valid else "missing" if tuned else "failed"
+    remedy = "" if valid else "fly with the default preset where you need the margin" if tuned else REMEDY
+    return Outcome(what, status, found, remedy)
+
+
+DRIVE = Drive("q450", Q450, Q450_RANGES, make_quadrotor, period=0.015, loops=loops, stability=stability)
