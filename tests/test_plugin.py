@@ -40,7 +40,9 @@ DOCTOR = """
 import artde_gym.doctor.environments as checks
 from controllers.checkup import validity
 checks.ours = lambda: ["TwoLinkArm-Swing-v0"]
-for check in (checks.bullet, checks.mujoco, checks.batch, checks.stable_baselines3, validity):
+from artde_gym.sim.factory import ENGINES
+engines = [lambda name=name: checks.in_engine(name) for name in ENGINES]
+for check in (*engines, checks.batch, checks.stable_baselines3, validity):
     for line in check():
         assert line.status in ("ok", "missing"), line
         print(line.what, line.status)
@@ -116,6 +118,7 @@ def run(folder: Path, site: Path, code: str, calls: list[list[str]] | None = Non
     return outcome.stdout
 
 
+@pytest.mark.torch
 def test_the_tutorial_takes_a_robot_through_everything(tmp_path: Path) -> None:
     for package in ("optuna", "stable_baselines3"):
         pytest.importorskip(package)

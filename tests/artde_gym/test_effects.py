@@ -64,12 +64,14 @@ def test_many_walk_as_each_alone_to_the_bit(period):
         assert alone.unwrapped.sampled_disturbances == many.unwrapped.sampled_disturbances[i]
 
 
+@pytest.mark.bullet
 def test_friction_takes_energy_in_both_engines():
     for engine in ("bullet", "mujoco"):
         free, rubbed = (walk(engine=engine, **kinds)[:, 12:24] for kinds in ({}, {"joint_friction": 5.0}))
         assert np.abs(rubbed).sum() < 0.7 * np.abs(free).sum()
 
 
+@pytest.mark.bullet
 def test_both_engines_pull_a_base_alike():
     moved = [walk(engine=engine, tether={"stiffness": 50.0}) - walk(engine=engine) for engine in ("bullet", "mujoco")]
     assert np.abs(moved[0]).max() > 0.01
@@ -80,6 +82,7 @@ def test_nothing_is_nothing_to_the_bit():
     np.testing.assert_array_equal(walk(joint_friction=0.0), walk())
 
 
+@pytest.mark.bullet
 def test_a_vehicle_is_pulled_alike_in_engines_and_in_numpy():
     options = {"duration": 3.0, "disturbances": EFFECTS[FLIGHT]}
     hover = np.array([10.0, 0.0, 0.0, 0.0])
