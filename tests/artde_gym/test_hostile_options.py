@@ -53,6 +53,8 @@ QUICK: dict[str, list[str]] = {
 }  # fmt: skip
 """Arguments with which a command has next to nothing to do, or something to refuse at its end."""
 
+pytestmark = pytest.mark.slow
+
 NUMBERS = ["-1", "0", "nan", "inf", "-inf", "1e308", "1e-308", "1" + "0" * 30, "x", "", "0x10", "1,5", "[1]", "true"]
 WORDS = ["", " ", ",", "x" * 300, "é" * 200, "[/1]", "../x", "none,none", "-", "null", "1e999", "{}", "\n", "tde,,pid"]
 OBJECTS = [
