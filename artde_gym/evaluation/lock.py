@@ -23,6 +23,7 @@ from filelock import FileLock, Timeout
 
 from artde_gym.errors import StoreError
 from artde_gym.evaluation.provenance import command
+from artde_gym.evaluation.workers import end_unguarded
 
 LOCK, HOLDER = ".lock", ".lock.json"
 
@@ -39,6 +40,7 @@ def writes_folder(function: Callable[_Arguments, _Result]) -> Callable[_Argument
 
     @functools.wraps(function)
     def holding(*args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result:
+        end_unguarded()
         out = signature.bind(*args, **kwargs).arguments.get("out")
         with contextlib.nullcontext() if out is None else locked(Path(out)):
             return function(*args, **kwargs)

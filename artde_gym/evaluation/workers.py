@@ -163,7 +163,12 @@ def check_workers(workers: Any) -> None:
     Raises:
         OptionError: unless it is a whole number from 1 to `MOST_WORKERS`.
     """
+    end_unguarded()
     whole("workers", workers, 1, MOST_WORKERS)
+
+
+def end_unguarded() -> None:
+    """End a worker that would start workers of its own, since its script starts them when it is imported."""
     if getattr(multiprocessing.current_process(), "_inheriting", False):  # as multiprocessing itself asks
         sys.exit(UNGUARDED)
 

@@ -25,7 +25,7 @@ import gymnasium as gym
 import artde_gym
 import controllers
 
-env = gym.make("{env_id}", duration=2.0)
+env = gym.make("{env_id}", duration=2.0, disturbances={{"payload": 0.3}})
 policy = controllers.make("artde", env)
 observation, info = env.reset(seed=0)
 action, state = policy.predict(observation)

@@ -106,6 +106,7 @@ def test_a_killed_training_continues_from_its_last_checkpoint(tmp_path):
     assert steps > 0
     configuration = json.loads((tmp_path / "run.json").read_text())["configuration"]
     recipe = Recipe(**configuration.pop("recipe"))
+    configuration.pop("engine")  # which the environment and its arguments decide
     training = Training(**{**configuration, "recipe": recipe, "steps": steps + 1})
     train(training, tmp_path)
     assert (
