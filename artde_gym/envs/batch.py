@@ -224,11 +224,13 @@ class BatchEnv(Counted, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
     def _check_engine(self, engine: str | None) -> None:
         """Tell where a vector runs that nobody has asked to run there."""
         if engine is None:
-            warnings.warn(
-                f"{type(self).__name__} runs in {self.own_engine!r}, gym.make in {resolve_engine(None)!r} unless told "
-                f"otherwise, so that results differ; give engine={self.own_engine!r} if this is meant",
-                stacklevel=6,  # where gymnasium.make_vec was called
-            )
+            default = resolve_engine(None)
+            if default != self.own_engine:
+                warnings.warn(
+                    f"{type(self).__name__} runs in {self.own_engine!r}, gym.make in {default!r} unless told "
+                    f"otherwise, so that results differ; give engine={self.own_engine!r} if this is meant",
+                    stacklevel=6,  # where gymnasium.make_vec was called
+                )
         elif engine != self.own_engine:
             allowed = f"{self.own_engine!r}; for engine {engine!r}: gym.make_vec(..., vectorization_mode='sync')"
             raise OptionError("engine", engine, allowed)

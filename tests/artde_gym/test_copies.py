@@ -120,7 +120,7 @@ def test_copies_do_not_touch_each_other(name: str, engine_name: EngineName) -> N
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("vector", [False, True])
 def test_a_fresh_environment_is_copied_too(name: str, vector: bool) -> None:
-    env = make_vec(name) if vector else make(name, "bullet")
+    env = make_vec(name) if vector else make(name, "mujoco")
     twin = pickle.loads(pickle.dumps(env))
     first, second = env.reset(seed=3)[0], twin.reset(seed=3)[0]
     assert first.tobytes() == second.tobytes()

@@ -122,6 +122,7 @@ def test_soft_contacts_let_feet_sink_in_mujoco() -> None:
 
 
 @pytest.mark.parametrize("time", [0.0125, 0.02, 0.04])
+@pytest.mark.bullet
 def test_bullet_corrects_the_depth_with_the_time_constant(time: float) -> None:
     made = make_engine("bullet", ojas("lumped"), DT)
     made.set_friction(0.8)
