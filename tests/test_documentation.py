@@ -110,7 +110,7 @@ def needing(name: str) -> Any:
     return pytest.param(name, marks=[pytest.mark.torch] if "stable_baselines3" in SCRIPTS[name] else [])
 
 
-@pytest.mark.parametrize("name", map(needing, SCRIPTS))
+@pytest.mark.parametrize("name", [needing(name) for name in SCRIPTS])
 def test_code_runs(name, tmp_path):
     run(SCRIPTS[name], tmp_path)
 
