@@ -22,6 +22,8 @@ MODULES: dict[str, str] = {
     "artde_gym.evaluation.sweep": "artde_gym.studies.sweep.execution",
     "artde_gym.evaluation.sweep_store": "artde_gym.studies.sweep.store",
     "artde_gym.evaluation.tune": "artde_gym.studies.tune.tuning",
+    "artde_gym.robots.dynamics": "artde_gym.multibody.dynamics",
+    "artde_gym.robots.spec": "artde_gym.multibody.spec",
 }
 """Old module -> where its contents are now."""
 

@@ -1,7 +1,7 @@
 """One writer for each folder: a lock that the system releases when its process dies, and that says who holds it.
 
-The lock is held on the file `.lock`, which is there as long as somebody writes; one that a killed process has left
-behind holds nobody up. A function that writes a folder is decorated by `writes_folder`.
+The lock is held on the file `.lock`, which is there as long as a process writes, and `.lock.json` says which one; files
+that a killed process has left behind lock nothing. A function that writes a folder is decorated by `writes_folder`.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def locked(folder: Path) -> Iterator[None]:
     finally:
         _held.discard(key)
         with contextlib.suppress(OSError):  # somebody has removed the folder
-            (folder / HOLDER).unlink()
+            (folder / HOLDER).unlink(missing_ok=True)
             if sys.platform != "win32":  # before the release: whoever waits for it then begins with a new file
                 (folder / LOCK).unlink()
                 for empty in reversed(made):

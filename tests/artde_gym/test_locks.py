@@ -146,3 +146,9 @@ def test_default_names_differ_also_within_a_second(tmp_path, monkeypatch):
     assert len(set(folders)) == 5
     assert all(folder.parts[0] == "runs" and folder.is_dir() for folder in folders)
     assert folder_of(Path("mine")) == Path("mine")
+
+
+def test_a_folder_that_stays_empty_goes_although_its_holder_could_not_sign(tmp_path: Path) -> None:
+    with locked(tmp_path / "run"):
+        (tmp_path / "run" / HOLDER).unlink()  # as on a full disk
+    assert not (tmp_path / "run").exists()
