@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from controllers.drive import DRIVES, Drive
 from controllers.law_table import LAWS
+from controllers.laws.errors import GainError
 from controllers.laws.stability import largest_joint_m_bar, largest_m_bar, tde_eigenvalues
 from controllers.laws.tde import TdeGains
 from controllers.laws.tracking import check_positive_number
@@ -68,7 +69,8 @@ class Design:
     @property
     def stiffness(self) -> Array:
         """K_d m_bar / L of each joint (n,)."""
-        return np.asarray(self.gains.k_d, dtype=np.float64) * self.m_bar / self.period
+        with np.errstate(over="ignore"):
+            return np.asarray(self.gains.k_d, dtype=np.float64) * self.m_bar / self.period
 
     @property
     def used(self) -> float:
@@ -92,14 +94,14 @@ class Design:
             "largest_m_bar": self.largest,
             "eigenvalues": [float(self.eigenvalues.min()), float(self.eigenvalues.max())],
             "used": self.used,
-            "room": self.room,
+            "room": _number(self.room),
             "joints": [
                 {
                     "name": name,
                     "m_bar": float(chosen),
-                    "largest_m_bar": float(limit) if np.isfinite(limit) else None,
-                    "stiffness": float(stiffness),
-                    "damping": float(chosen) / self.period,
+                    "largest_m_bar": _number(limit),
+                    "stiffness": _number(stiffness),
+                    "damping": _number(chosen / self.period),
                 }
                 for name, chosen, limit, stiffness in joints
             ],
@@ -139,11 +141,16 @@ def judge(loop: Loop, gains: TdeGains, period: float) -> Design:
     """Compare the gains of a loop with its limits.
 
     Raises:
-        GainError: for an m_bar that does not fit the loop, or a period that is not above zero.
+        GainError: for an m_bar that does not fit the loop, or is so large or small that its limits cannot be computed,
+            or a period that is not above zero.
     """
     check_positive_number("period", period)
-    eigenvalues = tde_eigenvalues(loop.inertia, gains.m_bar)
-    each = largest_joint_m_bar(loop.inertia, gains.m_bar).min(axis=0)
+    try:
+        with np.errstate(all="ignore"):  # the result tells
+            eigenvalues = tde_eigenvalues(loop.inertia, gains.m_bar)
+            each = largest_joint_m_bar(loop.inertia, gains.m_bar).min(axis=0)
+    except np.linalg.LinAlgError as error:
+        raise GainError("m_bar", gains.m_bar, f"of a size that can be compared with the inertia's ({error})") from error
     return Design(loop, gains, period, eigenvalues, largest_m_bar(loop.inertia), each)
 
 
@@ -186,6 +193,11 @@ def preset_designs(loop: Loop, drive: Drive, *, tuned: bool) -> list[Design]:
         for (law, preset), entry in drive.presets.items()
         if law in DELAYED and (preset == "tuned") == tuned
     ]
+
+
+def _number(value: float) -> float | None:
+    """The value as JSON can write it."""
+    return float(value) if np.isfinite(value) else None
 
 
 def _of_loop(gains: Any, loop: Loop, law: str, period: float) -> TdeGains:

@@ -96,6 +96,6 @@ def _print(one: Design, console: Console) -> None:
         f"Valid below: of a joint with the others as chosen. One m_bar for all: {one.largest:.4g} {loop.unit}."
     )
     low, high = one.eigenvalues.min(), one.eigenvalues.max()
-    edge = f"{100 * one.used:.0f} % of the way to the edge at 2, room for a factor of {one.room:.2f}"
+    edge = f"{100 * one.used:.0f} % of the way to the edge at 2, room for a factor of {one.room:.3g}"
     verdict = edge if one.valid else "OUTSIDE (0, 2): time-delay estimation diverges"
-    console.print(f"Eigenvalues of M^-1 m_bar: {low:.3f} to {high:.3f}, {verdict}.")
+    console.print(f"Eigenvalues of M^-1 m_bar: {low:.3g} to {high:.3g}, {verdict}.")

@@ -66,6 +66,7 @@ class Parameter:
         nonzero: whether a vector of zeros is refused.
         integer: whether the value is a whole number.
         choices: allowed words, or "site" or "joint" for the names that the robot has; rotors count as joints.
+        smaller_is_harder: whether a robot is disturbed more by smaller values.
     """
 
     name: str
@@ -78,6 +79,7 @@ class Parameter:
     nonzero: bool = False
     integer: bool = False
     choices: tuple[str, ...] | str = ()
+    smaller_is_harder: bool = False
 
 
 @renamed_arguments({"repeated": "multiple", "scalar": "shorthand"})
@@ -199,7 +201,7 @@ OWN: dict[str, DisturbanceSpec] = {
         DisturbanceSpec(
             "friction",
             "Friction coefficient of the pair foot and ground.",
-            (Parameter("coefficient", "1", 0.01, 2.0, None, "instead of the nominal 0.8"),),
+            (Parameter("coefficient", "1", 0.01, 2.0, None, "instead of the nominal 0.8", smaller_is_harder=True),),
             shorthand="coefficient",
             requires="feet",
         ),
@@ -273,7 +275,7 @@ OWN: dict[str, DisturbanceSpec] = {
         DisturbanceSpec(
             "encoder_bits",
             "Joint encoders of so many counts a turn; joint velocities are then differences of counts.",
-            (Parameter("bits", "1", 6, 32, None, "2^bits counts a turn", integer=True),),
+            (Parameter("bits", "1", 6, 32, None, "2^bits counts a turn", integer=True, smaller_is_harder=True),),
             shorthand="bits",
             requires="encoders",
         ),
@@ -296,7 +298,7 @@ OWN: dict[str, DisturbanceSpec] = {
             "A joint gives a share of the commanded torque only, or a rotor a share of its thrust.",
             (
                 _word("joint", "joint", None, f"which one, or {ALL!r}"),
-                Parameter("factor", "1", 0.0, 1.0, 0.0, "share that is left"),
+                Parameter("factor", "1", 0.0, 1.0, 0.0, "share that is left", smaller_is_harder=True),
                 _time("start", 0.0, "from when"),
             ),
             multiple=True,
@@ -360,7 +362,7 @@ OWN: dict[str, DisturbanceSpec] = {
         DisturbanceSpec(
             "torque_limit",
             "Actuators that saturate below the bounds of the action.",
-            (Parameter("limit", "Nm", 1.0, 40.0, None, "largest torque of each joint"),),
+            (Parameter("limit", "Nm", 1.0, 40.0, None, "largest torque of each joint", smaller_is_harder=True),),
             shorthand="limit",
             requires="torque_limit",
         ),

@@ -21,12 +21,13 @@ def name(text: str) -> str:
 
 
 def twice(names: Iterable[str]) -> str | None:
-    """Find a name that comes twice, in whatever spelling."""
+    """Find a name that comes twice, in whatever spelling; files are named by it, and many disks ignore case."""
     seen: set[str] = set()
     for text in names:
-        if name(text) in seen:
+        spelling = name(name(text).casefold())
+        if spelling in seen:
             return text
-        seen.add(name(text))
+        seen.add(spelling)
     return None
 
 

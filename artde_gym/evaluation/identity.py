@@ -20,7 +20,7 @@ import numpy as np
 
 from artde_gym.errors import OptionError
 from artde_gym.evaluation.provenance import SOURCES
-from artde_gym.registration import ControllerSpec
+from artde_gym.registration import ControllerSpec, resolved
 
 
 class Identity(NamedTuple):
@@ -73,9 +73,13 @@ def behind(name: str, env_id: str, item: Any, policy: Any) -> dict[str, str]:
     learned = content_of(policy) if isinstance(item, ControllerSpec) else None
     if learned is not None:
         found[f"weights of {name} in {env_id}"] = learned.value
-    if type(policy).__module__.split(".")[0] not in SOURCES:
-        with contextlib.suppress(OSError, TypeError, SyntaxError):  # typed at a prompt, or changed since
-            found[f"code of {name}"] = hashlib.sha256(inspect.getsource(type(policy)).encode()).hexdigest()
+    code: dict[str, Any] = {f"code of {name}": type(policy)}
+    if isinstance(item, ControllerSpec):
+        code[f"code that makes {name}"] = resolved(item.entry_point)
+    for what, written in code.items():
+        if written.__module__.split(".")[0] not in SOURCES:
+            with contextlib.suppress(OSError, TypeError, SyntaxError):  # typed at a prompt, or changed since
+                found[what] = hashlib.sha256(inspect.getsource(written).encode()).hexdigest()
     return found
 
 

@@ -234,6 +234,16 @@ def claim(folder: Path, record: str, configuration: Mapping[str, Any]) -> Mappin
     return None
 
 
+def check_replaceable(path: Path) -> None:
+    """See that a file may take the place of what is there: a device such as /dev/null would be lost to everybody.
+
+    Raises:
+        StoreError: if it is anything but a file.
+    """
+    if path.exists() and not path.is_file():
+        raise StoreError("output file", str(path), "a new file, or one that is replaced; this is something else")
+
+
 def write_atomically(path: Path, write: Callable[[BinaryIO], Any], by_way_of: Path | None = None) -> None:
     """Write a file so that it is there whole or not at all; until it is, it has another name in `by_way_of`.
 
@@ -241,7 +251,11 @@ def write_atomically(path: Path, write: Callable[[BinaryIO], Any], by_way_of: Pa
         path: of the file.
         write: writes its content.
         by_way_of: a folder of the same file system; None for the file's own.
+
+    Raises:
+        StoreError: if it would take the place of a folder or a device.
     """
+    check_replaceable(path)
     handle, temporary = tempfile.mkstemp(dir=by_way_of or path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:

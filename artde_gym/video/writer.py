@@ -14,6 +14,7 @@ from PIL import Image
 
 from artde_gym.arguments import check_number
 from artde_gym.errors import OptionError
+from artde_gym.evaluation.store import check_replaceable
 
 Picture = NDArray[np.uint8]
 
@@ -38,9 +39,11 @@ def check(out: Path) -> None:
 
     Raises:
         OptionError: for a suffix that nothing is known for, or ffmpeg that is missing.
+        StoreError: if it would take the place of a folder or a device.
     """
     if out.suffix not in SUFFIXES:
         raise OptionError("out", str(out), f"a file that ends in {', '.join(SUFFIXES)}")
+    check_replaceable(out)
     if out.suffix in CODECS:
         _ffmpeg(out)
 
@@ -69,14 +72,15 @@ def write(out: Path, pictures: Iterator[Picture], fps: float) -> None:
     """Write pictures of one size as a file, whole or not at all; PNG takes the first one.
 
     Raises:
-        OptionError: as of `check`.
+        OptionError, StoreError: as of `check`.
     """
     check(out)
+    check_replaceable(out)
     writers: dict[str, Callable[[Path, Iterator[Picture], float], None]] = {
         ".gif": _gif, ".webp": _webp, ".png": _png
     }  # fmt: skip
     out.parent.mkdir(parents=True, exist_ok=True)
-    part = out.with_name(f".{out.stem}.part{out.suffix}")
+    part = out.with_name(f".{out.stem}.{os.getpid()}.part{out.suffix}")  # two commands may write one video
     try:
         writers.get(out.suffix, _encode)(part, pictures, fps)
         os.replace(part, out)

@@ -122,7 +122,7 @@ def check_non_negative(field: str, value: float) -> None:
 
 def is_finite(value: object) -> TypeGuard[float]:
     """Whether `value` is a number at all, and a finite one."""
-    return isinstance(value, (int, float)) and math.isfinite(value)
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def make_plain(gains: Any) -> None:

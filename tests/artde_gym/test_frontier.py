@@ -22,6 +22,7 @@ from artde_gym.disturbances import DISTURBANCES, Disturbances
 from artde_gym.errors import ArtdeGymError, DisturbanceError, OptionError, StoreError, UnknownNameError
 from artde_gym.evaluation import statistics
 from artde_gym.evaluation.tasks import Update
+from artde_gym.kit import ROBOTS
 from artde_gym.palette import OTHERS, STYLES, styles
 from artde_gym.studies import Frontier, frontier
 from artde_gym.studies.frontier.axis import Axis, axis
@@ -374,3 +375,20 @@ def test_looks_are_fixed_and_tell_controllers_apart() -> None:
     many = styles(f"c{i}" for i in range(len(OTHERS)))
     assert len(set(many.values())) == len(OTHERS)
     assert len(styles(f"c{i}" for i in range(20))) == 20
+
+
+@pytest.mark.parametrize(
+    ("path", "low", "high", "harder"),
+    [("torque_limit.limit", 5.0, 40.0, "smaller"), ("rotor_inertia.inertia", 0.01, 0.1, "larger")],
+)
+def test_what_is_harder_where_the_standard_test_does_not_say(path: str, low: float, high: float, harder: str) -> None:
+    assert axis("BipedPush-v0", path, low, high, 0.01 * high).harder == harder
+
+
+def test_kinds_and_standard_tests_agree_on_what_is_harder() -> None:
+    for kit in ROBOTS.values():
+        for path, default in kit.frontier.ranges.items() if kit.frontier is not None else ():
+            kind, _, name = path.partition(".")
+            for parameter in DISTURBANCES[kind].parameters if kind in DISTURBANCES else ():
+                if parameter.name == name:
+                    assert parameter.smaller_is_harder == (default.harder == "smaller"), path

@@ -152,3 +152,22 @@ def test_a_folder_that_stays_empty_goes_although_its_holder_could_not_sign(tmp_p
     with locked(tmp_path / "run"):
         (tmp_path / "run" / HOLDER).unlink()  # as on a full disk
     assert not (tmp_path / "run").exists()
+
+
+def test_a_lock_on_a_file_that_its_last_holder_has_just_removed_holds_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fcntl = pytest.importorskip("fcntl")
+    flock: Callable[[int, int], None] = fcntl.flock
+
+    def late(file: int, operation: int) -> None:
+        """Lock a file that goes in between: once, as the holder before ends once."""
+        monkeypatch.setattr(fcntl, "flock", flock)
+        (tmp_path / LOCK).unlink()
+        flock(file, operation)
+
+    monkeypatch.setattr(fcntl, "flock", late)
+    with pytest.raises(StoreError, match="nobody else writes"), locked(tmp_path):
+        pass
+    with locked(tmp_path):
+        assert (tmp_path / LOCK).exists()

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import json
+import linecache
 import subprocess
 import sys
 from collections.abc import Callable
@@ -172,3 +174,40 @@ def test_the_hash_of_the_source_is_the_same_in_each_process():
     code = "from artde_gym.evaluation.provenance import source_hash; print(source_hash())"
     outcome = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
     assert outcome.stdout.strip() == source_hash()
+
+
+FACTORY = """
+import numpy as np
+
+
+class Constant:
+    def __init__(self, env, thrust):
+        self.action = np.full(env.action_space.shape, thrust)
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        return self.action, state
+
+
+def make(env):
+    return Constant(env, 1.0)
+"""
+
+
+def test_the_code_that_makes_a_controller_belongs_to_the_software(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(registration, "_controllers", dict(registration.registered_controllers()))
+    artde_gym.register_controller("constant", "own_factory:make")
+    module = tmp_path / "own_factory.py"
+
+    def run() -> Any:
+        sys.modules.pop("own_factory", None)
+        linecache.clearcache()
+        importlib.invalidate_caches()
+        return evaluate(["constant"], QUADROTOR, episodes=1, env_kwargs=FLIGHT, out=tmp_path / "run")
+
+    module.write_text(FACTORY)
+    run()
+    run()
+    module.write_text(FACTORY.replace("env, 1.0", "env, 1.25"))
+    with pytest.raises(StoreError, match="code that makes constant"):
+        run()

@@ -25,7 +25,14 @@ def test_a_scenario_named_twice_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "controllers", [["tde", "tde"], {"tde": "tde", " tde": "atde"}, {"é": "tde", "e\u0301": "atde"}]
+    "controllers",
+    [
+        ["tde", "tde"],
+        {"tde": "tde", " tde": "atde"},
+        {"é": "tde", "e\u0301": "atde"},
+        {"tde": "tde", "TDE": "atde"},  # one file of signals where a disk ignores case
+        {"ß": "tde", "SS": "atde"},
+    ],
 )
 def test_a_controller_named_twice_is_refused(tmp_path: Path, controllers: Any) -> None:
     with pytest.raises(OptionError, match="each name once"):

@@ -130,3 +130,20 @@ def test_the_command_prints_a_table_json_and_figures(tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} == {"limit.svg", "q-position.svg", "q-attitude.svg"}
     run = CliRunner().invoke(app, ["design", "--actuator-inertia", "none"])
     assert "OUTSIDE" in run.output
+
+
+@pytest.mark.parametrize("m_bar", [1e308, 1e-320])
+def test_an_m_bar_beyond_all_inertias_is_refused(m_bar: float) -> None:
+    with pytest.raises(GainError, match="m_bar"):
+        design("ojas", gains={"m_bar": m_bar})
+
+
+def test_a_truth_value_is_no_gain() -> None:
+    with pytest.raises(GainError, match="True"):
+        design("ojas", gains={"m_bar": True})
+
+
+@pytest.mark.parametrize("gains", [{"k_d": 1e308}, {"m_bar": 1e-300}])
+def test_json_of_a_design_has_no_number_that_json_cannot_write(gains: dict[str, float]) -> None:
+    for one in design("ojas", gains=gains):
+        json.dumps(one.to_dict(), allow_nan=False)

@@ -108,9 +108,15 @@ def axis(
         ends[field] = float(value)
     if harder not in (None, "larger", "smaller"):
         raise OptionError("harder", harder, "'larger', 'smaller'")
-    chosen = Axis(kind, name, unit, **ends, harder=harder or (default.harder if default else "larger"))
+    chosen = Axis(kind, name, unit, **ends, harder=harder or (default.harder if default else _harder(kind, name)))
     _check(chosen, None if standard is None else standard.time_step)
     return chosen
+
+
+def _harder(kind: str | None, name: str) -> Harder:
+    """Say which values of a parameter are harder, by what is known of its kind."""
+    parameters = DISTURBANCES[kind].parameters if kind is not None else ()
+    return "smaller" if any(one.name == name and one.smaller_is_harder for one in parameters) else "larger"
 
 
 def _find(env_id: str, path: str) -> tuple[str | None, str, str]:

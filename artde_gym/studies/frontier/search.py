@@ -81,7 +81,8 @@ def frontier(
         low: smallest value, in the parameter's unit (a control period in s); there are defaults for usual paths.
         high: largest value.
         tolerance: width of the bracket to be found.
-        harder: whether "larger" or "smaller" values are harder; there are defaults for usual paths.
+        harder: whether "larger" or "smaller" values are harder; without, it is what the robot's
+            standard test or the kind of disturbance says, else "larger".
         survival: share of episodes without a fall that a level takes to count as survived, above 0 up to 1.
         episodes: of each controller at each level.
         seed: of everything; episode i has the same seed at every level and for every controller.
