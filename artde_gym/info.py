@@ -78,8 +78,10 @@ def masked(values: Mapping[str, Any], mask: Mask) -> dict[str, Any]:
     """Put a mask beside each entry; masks that are there become narrower."""
     told: dict[str, Any] = {}
     for name, value in values.items():
-        if not name.startswith("_"):
-            told[name], told[f"_{name}"] = value, values[f"_{name}"] & mask if f"_{name}" in values else mask
+        if name[:1] != "_":
+            known = "_" + name
+            told[name] = value
+            told[known] = values[known] & mask if known in values else mask
     return told
 
 

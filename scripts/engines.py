@@ -3,7 +3,7 @@
 python scripts/engines.py errors        RMS tracking errors in S1, S2 and S3 at L = 1 and 2 ms
 python scripts/engines.py falls         rates of falls at L = 4 ms, over seeds
 python scripts/engines.py stiffness     rates of falls in S2-L4 over the stiffness of MuJoCo's contacts
-python scripts/engines.py iterations    RMS error of ARTDE over the iterations of Bullet's solver
+python scripts/engines.py iterations    error, gain and TDE error of ARTDE over the iterations of Bullet's solver
 """
 
 from __future__ import annotations
@@ -91,19 +91,25 @@ def stiffness(options: argparse.Namespace) -> None:
 
 
 def iterations(options: argparse.Namespace) -> None:
-    """RMS error of ARTDE (deg); MuJoCo, which has no gears to solve, comes last."""
-    heading("scenario", "L (ms)", *(str(count) for count in ITERATIONS), "MuJoCo")
+    """Figures of ARTDE; MuJoCo, which has no gears to solve, comes last."""
+    figures = {"RMS error (deg)": "rmse_deg", "mean gain": "robust_gain_mean", "TDE error (rad/s^2)": "tde_error_rms"}
+    heading("scenario", "L (ms)", "figure", *(str(count) for count in ITERATIONS), "MuJoCo")
     for period in PERIODS:
         for scenario in options.scenarios or ("S1", "S2"):
-            means = []
-            for count in (*ITERATIONS, None):
-                env = make(scenario, "mujoco" if count is None else "bullet", options, control_period=period)
-                if count is not None:
-                    client = env._engine._client
-                    bullet.setPhysicsEngineParameter(numSolverIterations=count, physicsClientId=client)
-                means.append(np.mean([episode["rmse_deg"] for episode in walks(env, "artde", options.episodes)]))
-                env.close()
-            row(scenario, f"{1e3 * period:g}", *(f"{mean:.4f}" for mean in means))
+            variants = [solved(scenario, period, count, options) for count in (*ITERATIONS, None)]
+            for name, column in figures.items():
+                means = [np.mean([episode[column] for episode in episodes]) for episodes in variants]
+                row(scenario, f"{1e3 * period:g}", name, *(f"{mean:.4f}" for mean in means))
+
+
+def solved(scenario: str, period: float, count: int | None, options: argparse.Namespace) -> list[dict[str, Any]]:
+    """Metrics of ARTDE's walks in Bullet with so many iterations; None is MuJoCo."""
+    env = make(scenario, "mujoco" if count is None else "bullet", options, control_period=period)
+    if count is not None:
+        bullet.setPhysicsEngineParameter(numSolverIterations=count, physicsClientId=env._engine._client)
+    episodes = walks(env, "artde", options.episodes)
+    env.close()
+    return episodes
 
 
 def make(scenario: str, engine: str, options: argparse.Namespace, **changes: Any) -> Any:

@@ -126,13 +126,14 @@ class QuadInfinityPayloadVectorEnv(BaseVectorEnv):
 
     def _advance(self, commands: Array, goes_on: Mask) -> dict[int, list[str]]:
         self._before = [fleet.thrusts for _, fleet in self._fleets]
-        waits = self.autoreset_mode is AutoresetMode.DISABLED
+        waiting = ~goes_on & (self.autoreset_mode is AutoresetMode.DISABLED)
         events: dict[int, list[str]] = {}
         for part, fleet in self._fleets:
-            still = np.flatnonzero(~goes_on[part] & waits)
-            motion = fleet.motion(still)
+            still = np.flatnonzero(waiting[part])
+            motion = fleet.motion(still) if still.size else []
             told = fleet.advance(commands[part].T).items()
-            fleet.stop(still, motion)
+            if motion:
+                fleet.stop(still, motion)
             events.update((part.start + vehicle, words) for vehicle, words in told if goes_on[part.start + vehicle])
         return events
 

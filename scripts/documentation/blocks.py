@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 FENCE = re.compile(r"^```[ ]*(?P<language>\w*)[^\n]*\n(?P<text>.*?)^```[ ]*$", re.DOTALL | re.MULTILINE)
 NOT_RUN = re.compile(r"<!-- not run: (?P<reason>.+?) -->\s*\Z")
-
+CALL = "artde-gym "
 
 SHELL = ["bash", "-euo", "pipefail", "-c"]
 
@@ -59,8 +59,15 @@ def mentions(markdown: str) -> list[list[str]]:
 
 
 def _lines(text: str) -> list[str]:
-    return text.replace("\\\n", " ").splitlines()
+    """Lines, but for a call that goes on after a backslash or within a single quote, which is one line."""
+    lines: list[str] = []
+    for line in text.replace("\\\n", " ").splitlines():
+        if lines and lines[-1].lstrip().startswith(CALL) and lines[-1].count("'") % 2:
+            lines[-1] += f" {line.strip()}"
+        else:
+            lines.append(line)
+    return lines
 
 
 def _calls(lines: Iterable[str]) -> list[list[str]]:
-    return [shlex.split(line, comments=True)[1:] for line in lines if line.startswith("artde-gym ")]
+    return [shlex.split(line, comments=True)[1:] for line in lines if line.startswith(CALL)]
