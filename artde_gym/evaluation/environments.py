@@ -112,6 +112,12 @@ def vector(env_id: str, arguments: str, size: int) -> Any:
     return gym.make_vec(env_id, size, vectorization_mode="vector_entry_point", **given)
 
 
+@functools.lru_cache(maxsize=KEPT)
+def vector_of_one(env_id: str, arguments: str, size: int = 1) -> Any:
+    """A vector of one environment, to try arguments and disturbances on; a few are kept."""
+    return vector(env_id, arguments, size)
+
+
 def drawing(env_id: str, kwargs: Mapping[str, Any], width: int) -> Any:
     """An environment of one's own that draws pictures `width` pixels wide, and three quarters of it high.
 

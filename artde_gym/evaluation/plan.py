@@ -46,6 +46,7 @@ class Plan:
         traced: how many episodes of each controller and cell leave signals; None for what the backend is used to.
         trace_hz: rate of stored signals; infinite for all of them.
         allow_mixed: whether results of other software may be continued.
+        together: whether cells that differ by disturbances alone run side by side in one vector, without traces.
     """
 
     controllers: Mapping[str, Policy | ControllerSpec]
@@ -58,6 +59,7 @@ class Plan:
     traced: int | None
     trace_hz: float
     allow_mixed: bool
+    together: bool = False
 
     @classmethod
     def of(
@@ -159,4 +161,5 @@ class Plan:
             Case(cell, name, item, self.gains.get(name, {}), self.seed)
             for cell, (name, item) in itertools.product(self.cells, self.controllers.items())
         ]
-        return tasks_of(cases, self.episodes, self.backend, done, traced=self.traces, trace_hz=self.trace_hz)
+        shown: dict[str, Any] = {"traced": self.traces, "trace_hz": self.trace_hz}
+        return tasks_of(cases, self.episodes, self.backend, done, **shown, together=self.together)

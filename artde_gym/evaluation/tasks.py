@@ -19,6 +19,10 @@ CHUNK = 2500
 """Episodes at most that run at once in the batch backend: no result depends on it, and more would be little faster."""
 
 
+SIDE_BY_SIDE = 128
+"""As `CHUNK`, of cells that run side by side: more would be little faster, and an interruption loses what runs."""
+
+
 class Case(NamedTuple):
     """One controller in one cell; `seed` is that of all its episodes."""
 
@@ -32,7 +36,8 @@ class Case(NamedTuple):
 class Task(NamedTuple):
     """Episodes of one controller that run at once: a single one, or a chunk. The first `traced` leave traces.
 
-    `metrics` are the registered ones that the process must know.
+    `cells` are those of the episodes, which differ from `cell` by name and disturbances alone. `metrics` are the
+    registered ones that the process must know.
     """
 
     backend: Backend
@@ -44,6 +49,7 @@ class Task(NamedTuple):
     seeds: list[int]
     trace_hz: float
     traced: int
+    cells: tuple[Cell, ...]
     metrics: tuple[str, ...] = ()
 
 
@@ -92,6 +98,7 @@ def tasks_of(
     *,
     traced: int = 0,
     trace_hz: float = 100.0,
+    together: bool = False,
 ) -> Iterator[Task]:
     """Portion out the episodes of all cases, chunk by chunk, so that an interruption leaves whole comparisons behind.
 
@@ -102,22 +109,45 @@ def tasks_of(
         done: cell's name, controller and number of the episodes that are left out.
         traced: the first so many episodes of each case leave traces.
         trace_hz: rate of the traces.
+        together: whether cases of one controller, whose cells differ by disturbances alone, run at once in a vector;
+            they leave no traces.
     """
-    for chunk in chunks_of(episodes, 1 if backend == "single" else CHUNK):
-        for case in cases:
-            left = [episode for episode in chunk if (case.cell.name, case.controller, episode) not in done]
+    groups = _groups(cases) if together and backend == "batch" else [[case] for case in cases]
+    largest = max(map(len, groups), default=1)
+    size = 1 if backend == "single" else max(1, SIDE_BY_SIDE // largest) if largest > 1 else CHUNK
+    for chunk in chunks_of(episodes, size):
+        for group in groups:
+            left = [
+                (case, episode)
+                for case, episode in itertools.product(group, chunk)
+                if (case.cell.name, case.controller, episode) not in done
+            ]
             if left:
-                yield task_of(case, left, backend, traced=traced, trace_hz=trace_hz)
+                yield _task(left, backend, 0 if len(group) > 1 else traced, trace_hz)
+
+
+def _groups(cases: Collection[Case]) -> list[list[Case]]:
+    """Put cases together that one vector and one policy can run."""
+    groups: dict[str, list[Case]] = {}
+    for case in cases:
+        kwargs = {name: value for name, value in case.cell.kwargs.items() if name != "disturbances"}
+        own = "disturbances" in case.cell.kwargs
+        key = (case.controller, case.seed, case.cell.env_id, kwargs, own, case.cell.phases, case.gains)
+        groups.setdefault(repr(key), []).append(case)
+    return list(groups.values())
 
 
 def task_of(case: Case, episodes: Iterable[int], backend: Backend, *, traced: int = 0, trace_hz: float = 100.0) -> Task:
     """Put some episodes of a case into one task."""
-    numbers = list(episodes)
-    seeds = [episode_seed(case.seed, episode) for episode in numbers]
-    shown = sum(episode < traced for episode in numbers)
-    return Task(
-        backend, case.cell, case.controller, case.policy, case.gains, numbers, seeds, trace_hz, shown, tuple(METRICS)
-    )
+    return _task([(case, episode) for episode in episodes], backend, traced, trace_hz)
+
+
+def _task(runs: list[tuple[Case, int]], backend: Backend, traced: int, trace_hz: float) -> Task:
+    case, numbers = runs[0][0], [episode for _, episode in runs]
+    seeds = [episode_seed(one.seed, episode) for one, episode in runs]
+    shown, cells = sum(episode < traced for episode in numbers), tuple(one.cell for one, _ in runs)
+    who = (case.cell, case.controller, case.policy, case.gains)
+    return Task(backend, *who, numbers, seeds, trace_hz, shown, cells, tuple(METRICS))
 
 
 def chunks_of(episodes: int, size: int) -> list[range]:
@@ -132,9 +162,9 @@ def run_task(task: Task, on_progress: Callable[[float], None]) -> list[Episode]:
     require_metrics(task.metrics)
     options: dict[str, Any] = {"trace_hz": task.trace_hz, "phases": task.cell.phases, "on_progress": on_progress}
     if task.backend == "batch":
-        env = vector_of(task.cell, len(task.seeds))
+        env, reset_options = vector_of(task.cells)
         policy = policy_for(task.policy, env, task.gains)
-        return run_batch(env, policy, task.seeds, traced=task.traced, **options)
+        return run_batch(env, policy, task.seeds, options=reset_options, traced=task.traced, **options)
     env, reset_options = single_of(task.cell)
     policy = policy_for(task.policy, env, task.gains)
     results = [run_episode(env, policy, seed, options=reset_options, **options) for seed in task.seeds]
@@ -146,7 +176,7 @@ def labels_of(task: Task, number: int) -> dict[str, Any]:
     return {
         "controller": task.controller,
         "env": task.cell.env_id,
-        "scenario": task.cell.name,
+        "scenario": task.cells[number].name,
         "seed": task.seeds[number],
         "episode": task.episodes[number],
     }

@@ -31,11 +31,11 @@ class Design:
     arguments: Mapping[str, Any]
 
     @classmethod
-    def of(cls, plan: Plan, axis: Axis, survival: float) -> Design:
+    def of(cls, plan: Plan, axis: Axis, survival: float, scenario: str | None = None) -> Design:
         """Make a design from a plan with one cell; without disturbances of its own, it is the robot's standard test.
 
         Raises:
-            OptionError, DisturbanceError: if the test, or an end of the axis, is not allowed.
+            UnknownNameError, OptionError, DisturbanceError: if the test, or an end of the axis, is not allowed.
         """
         if not (isinstance(survival, (int, float)) and 0 < survival <= 1):
             raise OptionError("survival", survival, "above 0 up to 1")
@@ -44,7 +44,9 @@ class Design:
         disturbances = arguments.pop("disturbances", None)
         _check_arguments(cell.env_id, plan.backend, axis, arguments)
         if disturbances is None:
-            disturbances, arguments = standard_test(cell.env_id, axis.path, arguments)
+            disturbances, arguments = standard_test(cell.env_id, axis.path, arguments, scenario)
+        elif scenario is not None:
+            raise OptionError("disturbances", disturbances, "None, if a scenario brings them")
         design = cls(axis, survival, disturbances, arguments)
         for end in (axis.levels[0], axis.levels[-1]):
             placed = design.at(end, cell)
