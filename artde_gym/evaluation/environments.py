@@ -72,6 +72,19 @@ def with_engine(env_id: str, kwargs: Mapping[str, Any], backend: Backend = "sing
     return {**kwargs, "engine": getattr(creator, "own_engine", None) if given is None else given}
 
 
+def fastest_backend(env_id: str, engine: str | None = None) -> tuple[Backend, str]:
+    """Choose the backend in which an environment is fastest, in one engine or in any; returns the engine, too.
+
+    Raises:
+        OptionError: for an unknown engine.
+    """
+    point = gym.spec(env_id).vector_entry_point
+    own = getattr(load_env_creator(point), "own_engine", None) if isinstance(point, str) else None
+    if own is not None and engine in (None, own):
+        return "batch", own
+    return "single", resolve_engine(engine)
+
+
 def physics_of(kwargs: Mapping[str, Any]) -> str:
     """Say in which physics an environment with arguments of `with_engine` runs."""
     name = kwargs.get("engine", "NumPy")

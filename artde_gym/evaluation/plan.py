@@ -46,7 +46,7 @@ class Plan:
         traced: how many episodes of each controller and cell leave signals; None for what the backend is used to.
         trace_hz: rate of stored signals; infinite for all of them.
         allow_mixed: whether results of other software may be continued.
-        together: whether cells that differ by disturbances alone run side by side in one vector, without traces.
+        together: whether cells that differ by disturbances alone run side by side in one vector.
     """
 
     controllers: Mapping[str, Policy | ControllerSpec]

@@ -109,8 +109,7 @@ def tasks_of(
         done: cell's name, controller and number of the episodes that are left out.
         traced: the first so many episodes of each case leave traces.
         trace_hz: rate of the traces.
-        together: whether cases of one controller, whose cells differ by disturbances alone, run at once in a vector;
-            they leave no traces.
+        together: whether cases of one controller, whose cells differ by disturbances alone, run at once in a vector.
     """
     groups = _groups(cases) if together and backend == "batch" else [[case] for case in cases]
     largest = max(map(len, groups), default=1)
@@ -123,7 +122,8 @@ def tasks_of(
                 if (case.cell.name, case.controller, episode) not in done
             ]
             if left:
-                yield _task(left, backend, 0 if len(group) > 1 else traced, trace_hz)
+                left.sort(key=lambda run: run[1] >= traced)  # a vector leaves traces of its first ones
+                yield _task(left, backend, traced, trace_hz)
 
 
 def _groups(cases: Collection[Case]) -> list[list[Case]]:

@@ -90,6 +90,7 @@ _FRONTIER = FrontierTest(
         "mass_error.factor": Range(1.0, 2.0, 0.05),
         "control_period": Range(0.001, 0.02, 0.001),
         "speed": Range(0.0, 0.25, 0.01),
+        "gains.m_bar": Range(0.03, 0.09, 0.006),
     },
 )
 
@@ -129,7 +130,7 @@ KIT = RobotKit(
         }
     ),
     scenarios=_SCENARIOS,
-    reproduced=(("S1", "S2", "S3", "S1-L4", "S2-L4", "S3-L4"), ("tde", "atde", "artde")),
+    reproduced=(tuple(entry.name for entry in _SCENARIOS), ("tde", "atde", "artde", "tde-stiff")),
     reported=REPORTED,
     frontier=_FRONTIER,
     motion=Motion("walk", 6.0, 2.0),

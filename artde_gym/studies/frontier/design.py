@@ -10,7 +10,7 @@ from artde_gym.errors import OptionError, among
 from artde_gym.evaluation.cells import Cell, tried
 from artde_gym.evaluation.environments import Backend, arguments_of
 from artde_gym.evaluation.plan import Plan
-from artde_gym.studies.frontier.axis import Axis
+from artde_gym.studies.frontier.axis import GAINS, Axis
 from artde_gym.studies.frontier.standard import standard_test
 
 
@@ -53,6 +53,12 @@ class Design:
             if axis.kind is None:  # nothing here knows the argument's range: let the environment refuse it at once
                 tried(plan.backend, placed)
         return design
+
+    def gains_at(self, value: float, plan: Plan) -> Mapping[str, dict[str, Any]]:
+        """Return the gains of a plan's controllers at one level."""
+        if self.axis.kind != GAINS:
+            return plan.gains
+        return {name: {**plan.gains.get(name, {}), self.axis.name: value} for name in plan.controllers}
 
     def at(self, value: float, cell: Cell) -> Cell:
         """Return a cell with this test at one level."""

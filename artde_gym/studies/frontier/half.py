@@ -14,6 +14,7 @@ from scipy.optimize import isotonic_regression
 from artde_gym.arrays import Array
 from artde_gym.evaluation.statistics import CONFIDENCE, Estimate
 from artde_gym.studies.frontier.axis import Axis
+from artde_gym.studies.frontier.result import Frontier
 
 HALF = 0.5
 RESAMPLES = 2000
@@ -37,46 +38,74 @@ def half_point(survived: ArrayLike, grid: Sequence[float]) -> Estimate:
         level; in the other one where not even half survive the easiest.
     """
     table = np.asarray(survived, dtype=np.float64)
-    seeds, rng = len(table), np.random.default_rng(0)
     value = _crossing(np.nanmean(table, axis=0), grid)[0]
-    draws = rng.integers(seeds, size=(RESAMPLES, seeds))
-    counts = np.stack([np.bincount(draw, minlength=seeds) for draw in draws])
-    known = np.isfinite(table)
-    totals = counts @ known
-    rates = (counts @ np.where(known, table, 0.0)) / np.maximum(totals, 1)
-    unique, times = np.unique(rates[(totals > 0).all(axis=1)], axis=0, return_counts=True)
-    brackets = np.repeat([_crossing(row, grid)[1:] for row in unique], times, axis=0)
-    tail, sign = (1 - CONFIDENCE) / 2, 1.0 if grid[-1] > grid[0] else -1.0
-    easy = np.quantile(sign * brackets[:, 0], tail, method="inverted_cdf")
-    hard = np.quantile(sign * brackets[:, 1], 1 - tail, method="inverted_cdf")
-    low, high = sorted((sign * float(easy), sign * float(hard)))
-    return Estimate(value, low, high, seeds)
+    brackets = _brackets(table, grid)
+    return Estimate(value, *_interval(brackets[:, 0], brackets[:, 1]), len(table))
 
 
-def half_points(episodes: pd.DataFrame, names: Sequence[str], varied: Axis) -> pd.DataFrame:
-    """Tabulate the half points of controllers from a grid's episodes, whose scenarios are the levels by number."""
-    rows = []
-    for name in names:
-        own = episodes[episodes["controller"] == name]
-        if own.empty:
-            continue
-        fell = own.assign(level=own["scenario"].astype(int)).pivot_table(
-            index="episode", columns="level", values="fell"
-        )
-        table = 1.0 - fell.reindex(columns=range(len(varied.levels))).to_numpy(np.float64)
-        if np.isfinite(table).any(axis=0).all():
-            rows.append((name, *half_point(table, varied.levels)))
+def half_difference(first: ArrayLike, second: ArrayLike, grid: Sequence[float]) -> Estimate:
+    """By how much the half point of `first` exceeds that of `second` on the same seeds; as for `half_point`.
+
+    The interval runs from the smallest difference that the brackets allow to the largest. An end is infinite, or NaN,
+    where the grid does not reach far enough.
+    """
+    tables = [np.asarray(table, dtype=np.float64) for table in (first, second)]
+    values = [_crossing(np.nanmean(table, axis=0), grid)[0] for table in tables]
+    (low, high), (other_low, other_high) = (_brackets(table, grid).T for table in tables)
+    with np.errstate(invalid="ignore"):
+        value = values[0] - values[1] if values[0] != values[1] else 0.0
+        return Estimate(value, *_interval(low - other_high, high - other_low), len(tables[0]))
+
+
+def survival_table(found: Frontier, name: str) -> Array | None:
+    """Tabulate who survived (seeds, levels) of a controller's episodes in a grid; None where a level has none."""
+    if found.episodes is None:
+        return None
+    own = found.episodes[found.episodes["controller"] == name]
+    if own.empty:
+        return None
+    rows = own.assign(level=own["scenario"].astype(int), fell=own["fell"].astype(float))
+    fell = rows.pivot_table(index="episode", columns="level", values="fell")
+    table = 1.0 - fell.reindex(columns=range(len(found.axis.levels))).to_numpy(np.float64)
+    return table if np.isfinite(table).any(axis=0).all() else None
+
+
+def half_points(found: Frontier) -> pd.DataFrame:
+    """Tabulate the half points of all controllers that have a whole grid."""
+    tables = {str(name): survival_table(found, str(name)) for name in found.table["controller"]}
+    levels = found.axis.levels
+    rows = [(name, *half_point(table, levels)) for name, table in tables.items() if table is not None]
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
 def half_text(row: dict[Any, Any], varied: Axis) -> str:
     """Write a half point with its interval: "37.0 (36..38)", "> 60" where it lies beyond the grid."""
     beyond = {math.inf: f"> {varied.high:g}", -math.inf: f"< {varied.low:g}"}
-    value = beyond.get(row["half"]) or f"{row['half']:.1f}"
+    value = beyond.get(row["half"]) or f"{row['half']:.3g}"
     if row["low"] == row["high"]:
         return value
     low, high = (beyond.get(row[end]) or f"{row[end]:g}" for end in ("low", "high"))
     return f"{value} ({low}..{high})"
+
+
+def _brackets(table: Array, grid: Sequence[float]) -> Array:
+    """The ends (resamples, 2) between which bootstrap samples of the seeds cross one half, the smaller first."""
+    seeds = len(table)
+    draws = np.random.default_rng(0).integers(seeds, size=(RESAMPLES, seeds))
+    counts = np.stack([np.bincount(draw, minlength=seeds) for draw in draws])
+    known = np.isfinite(table)
+    totals = counts @ known
+    rates = (counts @ np.where(known, table, 0.0)) / np.maximum(totals, 1)
+    rates[totals == 0] = np.nan
+    rates = np.where(np.isnan(rates), np.nanmean(table, axis=0), rates)  # of a sample without an episode of a level
+    unique, places = np.unique(rates, axis=0, return_inverse=True)
+    return np.sort([_crossing(row, grid)[1:] for row in unique], axis=1)[places.reshape(-1)]
+
+
+def _interval(lows: Array, highs: Array) -> tuple[float, float]:
+    tail = (1 - CONFIDENCE) / 2
+    low = np.quantile(lows, tail, method="inverted_cdf")
+    return float(low), float(np.quantile(highs, 1 - tail, method="inverted_cdf"))
 
 
 def _crossing(rates: Array, grid: Sequence[float]) -> tuple[float, float, float]:

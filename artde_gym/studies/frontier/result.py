@@ -31,6 +31,7 @@ class Frontier:
         complete: False if the search was interrupted.
         half: of a grid, one row a controller: the value at which `half` of the episodes are survived with its 95 %
             interval `low`, `high`, over so many `episodes` a level; see `artde_gym.studies.frontier.half`.
+        episodes: of a grid that has just been run, those of all levels, whose numbers are the scenarios.
     """
 
     table: pd.DataFrame
@@ -40,6 +41,7 @@ class Frontier:
     folder: Path | None = None
     complete: bool = True
     half: pd.DataFrame | None = None
+    episodes: pd.DataFrame | None = None
 
 
 def value_text(row: Mapping[Any, Any], unit: str) -> str:

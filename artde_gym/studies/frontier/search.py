@@ -39,7 +39,7 @@ from typing import Any
 import pandas as pd
 
 from artde_gym.evaluation import statistics
-from artde_gym.evaluation.cells import CUSTOM
+from artde_gym.evaluation.cells import CUSTOM, Cell
 from artde_gym.evaluation.environments import Backend
 from artde_gym.evaluation.evaluate import run_plan
 from artde_gym.evaluation.lock import writes_folder
@@ -48,7 +48,7 @@ from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.evaluation.tasks import Update
 from artde_gym.kit import Harder
-from artde_gym.studies.frontier.axis import axis
+from artde_gym.studies.frontier.axis import GAINS, axis
 from artde_gym.studies.frontier.bisection import search
 from artde_gym.studies.frontier.design import Design
 from artde_gym.studies.frontier.half import half_points
@@ -88,8 +88,8 @@ def frontier(
     Args:
         controllers: as for `evaluate`.
         env_id: any registered environment of this project.
-        vary: "kind.parameter" of `artde_gym.disturbances.KINDS`, in all entries of a kind that takes several; or an
-            argument of the environment that is a number.
+        vary: "kind.parameter" of `artde_gym.disturbances.KINDS`, in all entries of a kind that takes several; "gains."
+            and a gain of all controllers; or an argument of the environment that is a number.
         low: smallest value, in the parameter's unit (a control period in s); there are defaults for usual paths.
         high: largest value.
         tolerance: width of the bracket to be found.
@@ -159,7 +159,7 @@ class _Levels:
     ) -> None:
         self._plan, self._design, self._store, self._on_progress = plan, design, store, on_progress
         self._rows: list[dict[str, Any]] = []
-        self._half: pd.DataFrame | None = None
+        self._episodes: pd.DataFrame | None = None
 
     def search(self, *, grid: bool) -> Frontier:
         """Run the levels until all brackets are found, or the user interrupts."""
@@ -186,15 +186,27 @@ class _Levels:
         """Run all levels with all controllers; returns whether this was not interrupted."""
         levels, (cell,) = self._design.axis.levels, self._plan.cells
         cells = tuple(self._design.at(value, cell)._replace(name=str(i)) for i, value in enumerate(levels))
-        plan = dataclasses.replace(self._plan, cells=cells, together=True)
-        folder = None if self._store is None else self._store.path / GRID
-        on_progress = self._on_progress
+        if self._design.axis.kind == GAINS:
+            plans = [
+                (self._plan_at(value, cell), f"levels/{value:.10g}") for value, cell in zip(levels, cells, strict=True)
+            ]
+        else:
+            plans = [(dataclasses.replace(self._plan, cells=cells, together=True), GRID)]
+        results = [self._run_plan(*item) for item in plans]
+        self._episodes = pd.concat([result.episodes for result in results], ignore_index=True)
+        found = Result(self._episodes)
+        for i, name in itertools.product(range(len(levels)), self._plan.controllers):
+            self._count(found, str(i), levels[i], name)
+        return all(result.complete for result in results)
+
+    def _plan_at(self, value: float, cell: Cell) -> Plan:
+        return dataclasses.replace(self._plan, cells=(cell,), gains=self._design.gains_at(value, self._plan))
+
+    def _run_plan(self, plan: Plan, folder: str) -> Result:
+        """Run a plan whose cells are levels by number, into a folder within that of the frontier."""
+        levels, on_progress = self._design.axis.levels, self._on_progress
         tell = on_progress and (lambda update: on_progress(levels[int(update.task.cell.name)], update))
-        result = run_plan(plan, folder, tell)
-        for i, name in itertools.product(range(len(levels)), plan.controllers):
-            self._count(result, str(i), levels[i], name)
-        self._half = half_points(result.episodes, list(plan.controllers), self._design.axis)
-        return result.complete
+        return run_plan(plan, None if self._store is None else self._store.path / folder, tell)
 
     def _count(self, result: Result, scenario: str, value: float, name: str) -> bool:
         """Count a controller's falls at a level, and say whether it survived."""
@@ -210,6 +222,7 @@ class _Levels:
         """Run a level with some of the controllers, and say which of them survived it."""
         value = self._design.axis.levels[index]
         plan = self._plan.only(names, self._design.at(value, self._plan.cells[0]))
+        plan = dataclasses.replace(plan, gains=self._design.gains_at(value, plan))
         folder = None if self._store is None else self._store.level(value)
         result = run_plan(plan, folder, self._on_progress and functools.partial(self._on_progress, value))
         if not result.complete:
@@ -223,4 +236,7 @@ class _Levels:
         folder = None if self._store is None else self._store.path
         names = list(self._plan.controllers)
         found = frontier_of(self._design.axis, names, self._rows, self._design.survival, folder, complete)
-        return dataclasses.replace(found, half=self._half)
+        if self._episodes is None:
+            return found
+        found = dataclasses.replace(found, episodes=self._episodes)
+        return dataclasses.replace(found, half=half_points(found))
