@@ -148,11 +148,12 @@ def test_rates_of_a_grid_are_those_of_its_episodes(tmp_path: Path) -> None:
         own = episodes[
             (episodes["controller"] == row["controller"]) & (episodes["disturbance.payload.mass"] == row["value"])
         ]
-        survived = int((~own["fell"]).sum())
+        survived = own["fell"].tolist().count(False)
         assert (row["episodes"], row["survived"]) == (6, survived)
         assert (row["rate"], row["low"], row["high"]) == pytest.approx(rate(survived, 6)[:3])
     assert whole.levels["rate"].iloc[0] == 1.0 > whole.levels["rate"].iloc[-1]
     again = frontier(["tde", "artde"], "QuadInfinity-Payload-v0", "payload.mass", **grid, **kwargs)
+    assert again.half is not None
     pd.testing.assert_frame_equal(again.half, whole.half)
     read, _ = frontier_page.read_frontier(tmp_path / "run")
     assert read.half is not None
