@@ -100,7 +100,9 @@ def frontier(
         print_frontier(found, console)
         if figure is not None:
             path = figure if one is None else figure.with_stem(f"{figure.stem}-{one}")
-            write_atomically(path, lambda file, found=found: file.write(survival_chart(found).file().encode()))
+            write_atomically(
+                path, lambda file, found=found: file.write(survival_chart(found, legend=True).file().encode())
+            )
         if report and found.folder is not None:
             show_report(found.folder, console)
         if not found.complete:

@@ -74,16 +74,19 @@ def parts(found: Frontier) -> list[str]:
     ]
 
 
-def survival_chart(found: Frontier) -> Chart:
+def survival_chart(found: Frontier, *, legend: bool = False) -> Chart:
     """Draw the share of episodes without a fall over what is varied."""
     axis = found.axis
     shown = looks(str(row["controller"]) for row in _records(found.table))
     x = Axis.of(f"{axis.path} ({axis.unit})" if axis.unit != "1" else axis.path, [axis.low, axis.high])
     chart = Chart("Share of episodes without a fall against what was varied", x, Axis("no fall (%)", 0, 104), 460, 280)
     chart.level(100 * found.survival, f"wanted: {100 * found.survival:g} %")
+    if found.half is not None:
+        chart.level(50, "half")
+    apart = min(0.012 * (axis.high - axis.low), 0.5 * axis.tolerance / len(shown))
     for i, (name, look) in enumerate(shown.items()):
         rows = [row for row in _records(found.levels) if row["controller"] == name]
-        shift = (i - (len(shown) - 1) / 2) * 0.012 * (axis.high - axis.low)
+        shift = (i - (len(shown) - 1) / 2) * apart
         places = [row["value"] + shift for row in rows]
         chart.line(places, [100 * row["rate"] for row in rows], look, text=name, kind="path")
         for place, row in zip(places, rows, strict=True):
@@ -91,6 +94,8 @@ def survival_chart(found: Frontier) -> Chart:
             chart.marker(
                 place, 100 * row["rate"], look, f"{name} at {row['value']:g}: {row['survived']}/{row['episodes']}"
             )
+    if legend:
+        chart.legend(shown)
     return chart
 
 

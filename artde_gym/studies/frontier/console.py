@@ -59,14 +59,17 @@ def _print_grid(found: Frontier, console: Console) -> None:
     falls = Table(f"falls at{unit}", *names, box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
     for value, level in found.levels.groupby("value"):
         rows = {row["controller"]: row for row in level.to_dict(orient="records")}
-        counts = [f"{row['episodes'] - row['survived']}/{row['episodes']}" for row in map(rows.get, names) if row]
-        falls.add_row(f"{value:g}", *counts)
+        falls.add_row(f"{value:g}", *(_falls(rows.get(name)) for name in names))
     console.print(falls)
     console.print(
         "Half of the episodes end without a fall at (95 % interval: bootstrap over seeds, no narrower than the grid):"
     )
     for row in found.half.to_dict(orient="records"):
         console.print(f"  {row['controller']}: {half_text(row, found.axis)}{unit}")
+
+
+def _falls(row: dict[Any, Any] | None) -> str:
+    return "" if row is None else f"{row['episodes'] - row['survived']}/{row['episodes']}"
 
 
 def _share(row: dict[Any, Any], end: str) -> str:
