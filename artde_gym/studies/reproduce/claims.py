@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Literal
 
@@ -114,11 +114,25 @@ def repeats(scenario: str, other: str, metric: str, axes: Sequence[str], most: f
             return _nothing(result, scenario, ("artde",))
         difference = Estimate(-worst.value, -worst.high, -worst.low, worst.n)
         measured = f"largest difference: {axis} {_interval(difference)} %, {worst.n} pairs"
-        if all(-most <= estimate.low and estimate.high <= most for estimate in estimates.values()):
-            return Verdict("holds", measured)
-        if any(estimate.low > most or estimate.high < -most for estimate in estimates.values()):
-            return Verdict("does not hold", measured)
-        return Verdict("undecided", measured)
+        return Verdict(_within(estimates.values(), most), measured)
+
+    return judge
+
+
+def stays(scenario: str, other: str, metric: str, axes: Sequence[str], most: float) -> Callable[[Result], Verdict]:
+    """ARTDE's mean of the metric differs by at most `most` percent on every axis, in scenarios that share no draws."""
+
+    def judge(result: Result) -> Verdict:
+        for name in (scenario, other):
+            if missing := _missing(result, name, ("artde",)):
+                return missing
+        first, second = (_upright(result, name, "artde") for name in (scenario, other))
+        estimates = {axis: statistics.change(first[f"{metric}_{axis}"], second[f"{metric}_{axis}"]) for axis in axes}
+        axis, worst = max(estimates.items(), key=lambda item: np.nan_to_num(abs(item[1].value), nan=-1.0))
+        if worst.n == 0:
+            return _nothing(result, scenario, ("artde",))
+        measured = f"largest difference: {axis} {_interval(worst)} %, {len(first)} and {len(second)} episodes"
+        return Verdict(_within(estimates.values(), most), measured)
 
     return judge
 
@@ -248,6 +262,13 @@ def _upright(result: Result, scenario: str, controller: str) -> pd.DataFrame:
     rows = result.rows(scenario, controller)
     upright: pd.DataFrame = rows.loc[~rows["fell"].to_numpy(dtype=np.bool_)]
     return upright
+
+
+def _within(estimates: Collection[Estimate], most: float) -> Outcome:
+    """Whether all differences are at most so large (%)."""
+    if all(-most <= estimate.low and estimate.high <= most for estimate in estimates):
+        return "holds"
+    return "does not hold" if any(one.low > most or one.high < -most for one in estimates) else "undecided"
 
 
 def _missing(result: Result, scenario: str, controllers: tuple[str, ...]) -> Verdict | None:
