@@ -16,6 +16,7 @@ from artde_gym.cli import app
 from artde_gym.errors import OptionError, UnknownNameError
 from artde_gym.evaluation import evaluate
 from artde_gym.evaluation.statistics import rate
+from artde_gym.evaluation.tasks import Update
 from artde_gym.report import frontier_page
 from artde_gym.studies import Frontier, frontier
 from artde_gym.studies.frontier.axis import Axis
@@ -159,6 +160,33 @@ def test_rates_of_a_grid_are_those_of_its_episodes(tmp_path: Path) -> None:
     assert read.half is not None
     assert read.half["half"].tolist() == whole.half["half"].tolist()
     assert any("Half points" in part for part in frontier_page.parts(read))
+
+
+@pytest.mark.parametrize("vary", ["payload.mass", "gains.k_p_p"])
+def test_an_interrupted_grid_goes_on(vary: str, tmp_path: Path) -> None:
+    """After the first controller, or level, is finished; the whole is that of a grid without an interruption."""
+    span = {"payload.mass": (0.5, 2.1, 1.6), "gains.k_p_p": (8.0, 10.0, 2.0)}[vary]
+    options: dict[str, Any] = dict(zip(("low", "high", "tolerance"), span, strict=True))
+    options |= {"episodes": 2, "grid": True, "backend": "batch", "env_kwargs": {"duration": 1.0}}
+    names, env_id = ["tde", "artde"], "QuadInfinity-Payload-v0"
+    ended: list[float] = []
+
+    def interrupt(value: float, update: Update) -> None:
+        if len(ended) > 0:
+            raise KeyboardInterrupt
+        ended.extend([value] * update.ended)
+
+    def stop(_value: float, _update: Update) -> None:
+        raise KeyboardInterrupt
+
+    nothing = frontier(names, env_id, vary, out=tmp_path / "run", on_progress=stop, **options)
+    assert (nothing.complete, len(nothing.levels)) == (False, 0)
+    part = frontier(names, env_id, vary, out=tmp_path / "run", on_progress=interrupt, **options)
+    assert not part.complete
+    assert 0 < len(part.levels) < 4
+    whole = frontier(names, env_id, vary, out=tmp_path / "run", **options)
+    assert whole.complete
+    pd.testing.assert_frame_equal(whole.levels, frontier(names, env_id, vary, **options).levels)
 
 
 def test_levels_side_by_side_are_each_level_alone() -> None:

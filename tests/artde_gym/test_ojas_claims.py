@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
+from pathlib import Path
+
 import gymnasium as gym
 import numpy as np
 import pandas as pd
@@ -11,9 +14,11 @@ import artde_gym  # noqa: F401  # registers the environments
 import controllers
 from artde_gym.evaluation import Result, statistics
 from artde_gym.evaluation.environments import fastest_backend
+from artde_gym.kit import ROBOTS, Range
 from artde_gym.robots.ojas.claims import CLAIMS, FITTED
 from artde_gym.robots.ojas.thesis import JOINTS
 from artde_gym.scenarios import SCENARIOS
+from artde_gym.studies import reproduce
 from artde_gym.studies.reproduce.claims import judge, stays
 from controllers.design import design
 from controllers.drive import DRIVES
@@ -104,6 +109,22 @@ def test_the_stiff_preset_is_a_controller() -> None:
     env = gym.make(WALK, duration=0.3, actuator_inertia="lumped")
     assert controllers.make("tde-stiff", env).gains == controllers.make("tde", env, m_bar=0.077).gains
     assert controllers.make("pid", env, preset="stiff").gains == controllers.make("pid", env, m_bar=0.077).gains
+
+
+def test_reproduce_runs_the_grids_behind_claims(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    kit = ROBOTS["ojas"]
+    assert kit.frontier is not None
+    short = dataclasses.replace(kit.frontier, ranges={"grf_pulse.magnitude": Range(20.0, 60.0, 40.0, duration=0.3)})
+    monkeypatch.setitem(ROBOTS._entries, "ojas", dataclasses.replace(kit, frontier=short))
+    monkeypatch.setitem(SCENARIOS._entries, "S2", dataclasses.replace(SCENARIOS["S2"], kwargs={"duration": 0.3}))
+    names = ["tde", "atde", "artde"]
+    found = reproduce("biped", tmp_path, scenarios=["S2"], controllers=names, curves=True, episodes=2)
+    assert (tmp_path / "curves" / "S2" / "half.csv").exists()
+    assert found.curves["S2", "grf_pulse.magnitude"].levels["episodes"].tolist() == [2] * 6
+    verdict = found.claims.set_index("claim").loc["ARTDE survives a larger ground force than ATDE, and ATDE than TDE"]
+    assert verdict["verdict"] == "undecided"  # 0.3 s of standing topples nobody at any level
+    without = reproduce("biped", tmp_path, scenarios=["S2"], controllers=names, episodes=2)
+    assert not without.claims["claim"].str.contains("survives a larger ground force").any()
 
 
 def test_reproduce_takes_the_fastest_backend() -> None:

@@ -59,7 +59,7 @@ def half_difference(first: ArrayLike, second: ArrayLike, grid: Sequence[float]) 
 
 def survival_table(found: Frontier, name: str) -> Array | None:
     """Tabulate who survived (seeds, levels) of a controller's episodes in a grid; None where a level has none."""
-    if found.episodes is None:
+    if found.episodes is None or found.episodes.empty:
         return None
     own = found.episodes[found.episodes["controller"] == name]
     if own.empty:

@@ -192,12 +192,16 @@ class _Levels:
             ]
         else:
             plans = [(dataclasses.replace(self._plan, cells=cells, together=True), GRID)]
-        results = [self._run_plan(*item) for item in plans]
-        self._episodes = pd.concat([result.episodes for result in results], ignore_index=True)
+        complete, parts = True, []
+        for plan, folder in plans:
+            result = self._run_plan(plan, folder) if complete else Result(pd.DataFrame(), complete=False)
+            complete = result.complete
+            parts.append(result.episodes)
+        self._episodes = pd.concat(parts, ignore_index=True)
         found = Result(self._episodes)
         for i, name in itertools.product(range(len(levels)), self._plan.controllers):
             self._count(found, str(i), levels[i], name)
-        return all(result.complete for result in results)
+        return complete
 
     def _plan_at(self, value: float, cell: Cell) -> Plan:
         return dataclasses.replace(self._plan, cells=(cell,), gains=self._design.gains_at(value, self._plan))
@@ -210,9 +214,9 @@ class _Levels:
 
     def _count(self, result: Result, scenario: str, value: float, name: str) -> bool:
         """Count a controller's falls at a level, and say whether it survived."""
-        falls, rate = result.falls(scenario, name)
-        if rate.n == 0:
+        if result.episodes.empty or result.rows(scenario, name).empty:
             return False
+        falls, rate = result.falls(scenario, name)
         share = statistics.rate(rate.n - falls, rate.n)
         row = (value, name, rate.n, rate.n - falls, *share[:3])
         self._rows.append(dict(zip(LEVEL_COLUMNS, row, strict=True)))
