@@ -9,7 +9,6 @@ import typer
 
 from artde_gym.cli.arguments import (
     AllowMixed,
-    Backend,
     Controllers,
     Disturbances,
     Engine,
@@ -18,6 +17,7 @@ from artde_gym.cli.arguments import (
     Out,
     Report,
     Seed,
+    Vectorized,
     Workers,
     environment_kwargs,
     folder_of,
@@ -54,7 +54,7 @@ def frontier(
     disturbances: Disturbances = None,
     env_kwargs: EnvKwargs = None,
     gains: Gains = None,
-    backend: Backend = "single",
+    vectorized: Vectorized = False,
     scenario: Annotated[
         str | None, typer.Option(help="In place of the standard test's, comma-separated; a folder inside for each.")
     ] = None,
@@ -89,7 +89,7 @@ def frontier(
                 disturbances=optional_json("--disturbances", disturbances),
                 env_kwargs=kwargs,
                 gains=json_object("--gains", gains),
-                backend=backend,  # pyright: ignore[reportArgumentType]  # checked there
+                vectorized=vectorized,  # pyright: ignore[reportArgumentType]  # checked there
                 scenario=one,
                 grid=grid,
                 allow_mixed=allow_mixed,

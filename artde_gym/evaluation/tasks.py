@@ -6,13 +6,12 @@ import itertools
 from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import Any, NamedTuple
 
-from artde_gym.evaluation.batch import run_batch
 from artde_gym.evaluation.cells import Cell, single_of, vector_of
-from artde_gym.evaluation.environments import Backend
 from artde_gym.evaluation.gains import policy_for
 from artde_gym.evaluation.registered import METRICS, require_metrics
 from artde_gym.evaluation.rollout import Episode, Policy, run_episode
 from artde_gym.evaluation.seeds import episode_seed
+from artde_gym.evaluation.vector_rollout import run_vector
 from artde_gym.registration import ControllerSpec
 
 CHUNK = 2500
@@ -34,21 +33,21 @@ class Case(NamedTuple):
 
 
 class Task(NamedTuple):
-    """Episodes of one controller that run at once: a single one, or a chunk. The first `traced` leave traces.
+    """Episodes of one controller that run at once: a single one, or a chunk. The first `record_episodes` leave traces.
 
     `cells` are those of the episodes, which differ from `cell` by name and disturbances alone. `metrics` are the
     registered ones that the process must know.
     """
 
-    backend: Backend
+    vectorized: bool
     cell: Cell
     controller: str
     policy: Policy | ControllerSpec
     gains: dict[str, Any]
     episodes: list[int]
     seeds: list[int]
-    trace_hz: float
-    traced: int
+    record_hz: float
+    record_episodes: int
     cells: tuple[Cell, ...]
     metrics: tuple[str, ...] = ()
 
@@ -93,11 +92,11 @@ class Progress:
 def tasks_of(
     cases: Collection[Case],
     episodes: int,
-    backend: Backend,
+    vectorized: bool,
     done: Collection[tuple[str, str, int]],
     *,
-    traced: int = 0,
-    trace_hz: float = 100.0,
+    record_episodes: int = 0,
+    record_hz: float = 100.0,
     together: bool = False,
 ) -> Iterator[Task]:
     """Portion out the episodes of all cases, chunk by chunk, so that an interruption leaves whole comparisons behind.
@@ -105,15 +104,15 @@ def tasks_of(
     Args:
         cases: what is run; no two have both the cell's name and the controller in common.
         episodes: of each case.
-        backend: of all of them.
+        vectorized: of all of them.
         done: cell's name, controller and number of the episodes that are left out.
-        traced: the first so many episodes of each case leave traces.
-        trace_hz: rate of the traces.
+        record_episodes: the first so many episodes of each case leave traces.
+        record_hz: rate of the traces.
         together: whether cases of one controller, whose cells differ by disturbances alone, run at once in a vector.
     """
-    groups = _groups(cases) if together and backend == "batch" else [[case] for case in cases]
+    groups = _groups(cases) if together and vectorized else [[case] for case in cases]
     largest = max(map(len, groups), default=1)
-    size = 1 if backend == "single" else max(1, SIDE_BY_SIDE // largest) if largest > 1 else CHUNK
+    size = 1 if not vectorized else max(1, SIDE_BY_SIDE // largest) if largest > 1 else CHUNK
     for chunk in chunks_of(episodes, size):
         for group in groups:
             left = [
@@ -122,8 +121,8 @@ def tasks_of(
                 if (case.cell.name, case.controller, episode) not in done
             ]
             if left:
-                left.sort(key=lambda run: run[1] >= traced)  # a vector leaves traces of its first ones
-                yield _task(left, backend, traced, trace_hz)
+                left.sort(key=lambda run: run[1] >= record_episodes)  # a vector leaves traces of its first ones
+                yield _task(left, vectorized, record_episodes, record_hz)
 
 
 def _groups(cases: Collection[Case]) -> list[list[Case]]:
@@ -137,17 +136,19 @@ def _groups(cases: Collection[Case]) -> list[list[Case]]:
     return list(groups.values())
 
 
-def task_of(case: Case, episodes: Iterable[int], backend: Backend, *, traced: int = 0, trace_hz: float = 100.0) -> Task:
+def task_of(
+    case: Case, episodes: Iterable[int], vectorized: bool, *, record_episodes: int = 0, record_hz: float = 100.0
+) -> Task:
     """Put some episodes of a case into one task."""
-    return _task([(case, episode) for episode in episodes], backend, traced, trace_hz)
+    return _task([(case, episode) for episode in episodes], vectorized, record_episodes, record_hz)
 
 
-def _task(runs: list[tuple[Case, int]], backend: Backend, traced: int, trace_hz: float) -> Task:
+def _task(runs: list[tuple[Case, int]], vectorized: bool, record_episodes: int, record_hz: float) -> Task:
     case, numbers = runs[0][0], [episode for _, episode in runs]
     seeds = [episode_seed(one.seed, episode) for one, episode in runs]
-    shown, cells = sum(episode < traced for episode in numbers), tuple(one.cell for one, _ in runs)
+    shown, cells = sum(episode < record_episodes for episode in numbers), tuple(one.cell for one, _ in runs)
     who = (case.cell, case.controller, case.policy, case.gains)
-    return Task(backend, *who, numbers, seeds, trace_hz, shown, cells, tuple(METRICS))
+    return Task(vectorized, *who, numbers, seeds, record_hz, shown, cells, tuple(METRICS))
 
 
 def chunks_of(episodes: int, size: int) -> list[range]:
@@ -160,15 +161,17 @@ def chunks_of(episodes: int, size: int) -> list[range]:
 def run_task(task: Task, on_progress: Callable[[float], None]) -> list[Episode]:
     """Run the episodes of a task; `on_progress` is called with the simulated time (s)."""
     require_metrics(task.metrics)
-    options: dict[str, Any] = {"trace_hz": task.trace_hz, "phases": task.cell.phases, "on_progress": on_progress}
-    if task.backend == "batch":
+    options: dict[str, Any] = {"record_hz": task.record_hz, "phases": task.cell.phases, "on_progress": on_progress}
+    if task.vectorized:
         env, reset_options = vector_of(task.cells)
         policy = policy_for(task.policy, env, task.gains)
-        return run_batch(env, policy, task.seeds, options=reset_options, traced=task.traced, **options)
+        return run_vector(
+            env, policy, task.seeds, options=reset_options, record_episodes=task.record_episodes, **options
+        )
     env, reset_options = single_of(task.cell)
     policy = policy_for(task.policy, env, task.gains)
     results = [run_episode(env, policy, seed, options=reset_options, **options) for seed in task.seeds]
-    return [result if i < task.traced else Episode(result.row, {}) for i, result in enumerate(results)]
+    return [result if i < task.record_episodes else Episode(result.row, {}) for i, result in enumerate(results)]
 
 
 def labels_of(task: Task, number: int) -> dict[str, Any]:

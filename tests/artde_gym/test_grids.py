@@ -138,7 +138,7 @@ def test_who_survives_more_needs_all_of_them() -> None:
 def test_rates_of_a_grid_are_those_of_its_episodes(tmp_path: Path) -> None:
     """Payloads that four rotors lift, hardly lift, and do not lift; counted by hand in the table of episodes."""
     grid: dict[str, Any] = {"low": 1.0, "high": 2.0, "tolerance": 0.25, "episodes": 6, "seed": 3, "grid": True}
-    kwargs: dict[str, Any] = {"env_kwargs": {"duration": 2.0}, "backend": "batch", "out": tmp_path / "run"}
+    kwargs: dict[str, Any] = {"env_kwargs": {"duration": 2.0}, "vectorized": True, "out": tmp_path / "run"}
     whole = frontier(["tde", "artde"], "QuadInfinity-Payload-v0", "payload.mass", **grid, **kwargs)
     assert whole.complete
     assert whole.half is not None
@@ -167,7 +167,7 @@ def test_an_interrupted_grid_goes_on(vary: str, tmp_path: Path) -> None:
     """After the first controller, or level, is finished; the whole is that of a grid without an interruption."""
     span = {"payload.mass": (0.5, 2.1, 1.6), "gains.k_p_p": (8.0, 10.0, 2.0)}[vary]
     options: dict[str, Any] = dict(zip(("low", "high", "tolerance"), span, strict=True))
-    options |= {"episodes": 2, "grid": True, "backend": "batch", "env_kwargs": {"duration": 1.0}}
+    options |= {"episodes": 2, "grid": True, "vectorized": True, "env_kwargs": {"duration": 1.0}}
     names, env_id = ["tde", "artde"], "QuadInfinity-Payload-v0"
     ended: list[float] = []
 
@@ -193,7 +193,7 @@ def test_levels_side_by_side_are_each_level_alone() -> None:
     """To the bit: nothing of an episode depends on what runs beside it."""
     kwargs: dict[str, Any] = {"duration": 2.6, "control_period": 0.004}
     pulse = {"shape": "double_hump", "duration": 1.0}
-    options: dict[str, Any] = {"episodes": 2, "seed": 5, "backend": "batch", "env_kwargs": kwargs}
+    options: dict[str, Any] = {"episodes": 2, "seed": 5, "vectorized": True, "env_kwargs": kwargs}
     grid = frontier(
         ["artde"],
         WALK,
@@ -208,7 +208,7 @@ def test_levels_side_by_side_are_each_level_alone() -> None:
     assert grid.episodes is not None
     for i, value in enumerate((20.0, 60.0)):
         pulsed = {"grf_pulse": {**pulse, "magnitude": value}}
-        alone = evaluate(["artde"], WALK, disturbances=pulsed, trace_hz=10.0, **options).episodes
+        alone = evaluate(["artde"], WALK, disturbances=pulsed, record_hz=10.0, **options).episodes
         beside = grid.episodes[grid.episodes["scenario"] == str(i)]
         for column in ("seed", "fell", "rmse_deg", "robust_gain_mean", "reward"):
             assert beside[column].tolist() == alone[column].tolist()

@@ -129,7 +129,7 @@ def test_reproduce_runs_the_grids_behind_claims(tmp_path: Path, monkeypatch: pyt
 
 def test_reproduce_takes_the_fastest_backend() -> None:
     assert fastest_backend(WALK) == fastest_backend(WALK, "mujoco") == ("batch", "mujoco")
-    backend, engine = fastest_backend("QuadInfinity-Payload-v0")
-    assert backend == "batch"
+    vectorized, engine = fastest_backend("QuadInfinity-Payload-v0")
+    assert vectorized
     assert engine not in ("bullet", "mujoco")
     assert fastest_backend("QuadInfinity-Payload-v0", "mujoco") == ("single", "mujoco")

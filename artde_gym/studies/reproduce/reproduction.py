@@ -20,9 +20,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from artde_gym.evaluation.cells import Cell
-from artde_gym.evaluation.environments import Backend, fastest_backend
+from artde_gym.evaluation.environments import fastest_backend
 from artde_gym.evaluation.evaluate import run_plan
 from artde_gym.evaluation.labels import named_controllers
 from artde_gym.evaluation.lock import writes_folder
@@ -39,7 +39,7 @@ from artde_gym.studies.reproduce.claims import all_claims, judge
 ADAPTIVE, ABLATION = "artde", "tde+kd"
 EPISODES: Mapping[Backend, int] = {"batch": 10, "single": 4}
 """Where walks run one by one, fewer of them: all seeds alike are still more often than not."""
-TRACED = 3  # episodes of each cell that leave their signals: to look at; compressing all takes a minute or two
+RECORD_EPISODES = 3  # episodes of each cell that leave their signals: to look at; compressing all takes a minute or two
 GAIN = "robust_gain_mean"  # column of a law's mean c; with a suffix for each loop of a cascade, as its gains have
 
 
@@ -64,7 +64,7 @@ def kit_of(title: str) -> RobotKit:
         UnknownNameError: if there is none with scenarios to reproduce.
     """
     if title not in titles():
-        raise UnknownNameError("robot", title, among(title, titles()))
+        raise UnknownNameError("robot", title, suggest_names(title, titles()))
     return next(kit for kit in ROBOTS.values() if kit.title == title)
 
 
@@ -107,7 +107,7 @@ def reproduce(
         episodes: seeded episodes of each controller in each scenario; None for `EPISODES` of the backend.
         seed: of everything.
         workers: processes; the results do not depend on it.
-        engine: physics engine, in its fastest backend; None for the fastest of all.
+        engine: physics engine, in its fastest vectorized; None for the fastest of all.
         allow_mixed: as for `evaluate`.
         on_progress: called with what runs ("episodes", "ablation in S1") and the progress of its episodes.
 
@@ -123,16 +123,16 @@ def reproduce(
         raise OptionError("controllers", ABLATION, "other names; it is run by ablation=True, at gains of its own")
     if ablation and ADAPTIVE not in names:
         raise OptionError("controllers", names, f"{ADAPTIVE!r} among them, from which the ablation takes its gain")
-    backend, engine = fastest_backend(find_scenario(chosen[0]).env_id, engine)
+    vectorized, engine = fastest_backend(find_scenario(chosen[0]).env_id, engine)
     plan = Plan.of(
         names,
         scenario=chosen,
-        episodes=EPISODES[backend] if episodes is None else episodes,
+        episodes=EPISODES[vectorized] if episodes is None else episodes,
         seed=seed,
         workers=workers,
         env_kwargs={"engine": engine},
-        backend=backend,
-        traced=TRACED,
+        vectorized=vectorized,
+        record_episodes=RECORD_EPISODES,
         allow_mixed=allow_mixed,
     )
     plan = dataclasses.replace(plan, together=True)
@@ -173,7 +173,7 @@ def _grid(
         workers=plan.workers,
         out=folder / "curves" / scenario,
         env_kwargs={"engine": cell.kwargs["engine"]},
-        backend=plan.backend,
+        vectorized=plan.vectorized,
         allow_mixed=plan.allow_mixed,
         on_progress=on_progress and (lambda value, update: on_progress(f"{path} {value:g} in {scenario}", update)),
     )
