@@ -9,6 +9,7 @@ import typer
 
 from artde_gym.cli.arguments import (
     AllowMixed,
+    Backend,
     Controllers,
     Disturbances,
     Engine,
@@ -25,6 +26,7 @@ from artde_gym.cli.arguments import (
     names,
     optional_json,
     processes,
+    vectorized_by,
 )
 from artde_gym.cli.display import Display, terminal
 from artde_gym.cli.report import show_report
@@ -55,6 +57,7 @@ def frontier(
     env_kwargs: EnvKwargs = None,
     gains: Gains = None,
     vectorized: Vectorized = False,
+    backend: Backend = None,
     scenario: Annotated[
         str | None, typer.Option(help="In place of the standard test's, comma-separated; a folder inside for each.")
     ] = None,
@@ -89,7 +92,7 @@ def frontier(
                 disturbances=optional_json("--disturbances", disturbances),
                 env_kwargs=kwargs,
                 gains=json_object("--gains", gains),
-                vectorized=vectorized,  # pyright: ignore[reportArgumentType]  # checked there
+                vectorized=vectorized_by(vectorized, backend),
                 scenario=one,
                 grid=grid,
                 allow_mixed=allow_mixed,

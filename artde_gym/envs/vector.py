@@ -238,7 +238,7 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
 
     def _replace(self, given: Mapping[str, Any] | Sequence[Mapping[str, Any]]) -> None:
         """Take other disturbances from now on: for all environments, or a list with those of each."""
-        if not isinstance(given, (list, tuple)):
+        if isinstance(given, Mapping):
             self._disturbances, self._apart = self._parse(given), ()
         elif len(given) == self.num_envs:
             self._apart = [self._parse(one) for one in given]

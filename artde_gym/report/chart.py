@@ -189,9 +189,9 @@ class Chart:
         (across,), (up,) = self._points([x], [y])
         self._parts.append(f'<text x="{across:.1f}" y="{up:.1f}" text-anchor="middle">{escape(text)}</text>')
 
-    def legend(self, looks: Mapping[str, Style]) -> None:
-        """Name the looks in the lower left corner, for a chart that stands alone."""
-        for i, (name, look) in enumerate(reversed(looks.items())):
+    def legend(self, shown: Mapping[str, Style]) -> None:
+        """Name the styles in the lower left corner, for a chart that stands alone."""
+        for i, (name, look) in enumerate(reversed(list(shown.items()))):
             up = self.height - BOTTOM - 14 - 16 * i
             shape = SHAPES.get(look.marker, SHAPES["o"])
             self._parts.append(

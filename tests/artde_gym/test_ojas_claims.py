@@ -13,7 +13,7 @@ import pytest
 import artde_gym  # noqa: F401  # registers the environments
 import controllers
 from artde_gym.evaluation import Result, statistics
-from artde_gym.evaluation.environments import fastest_backend
+from artde_gym.evaluation.environments import fastest_engine
 from artde_gym.kit import ROBOTS, Range
 from artde_gym.robots.ojas.claims import CLAIMS, FITTED
 from artde_gym.robots.ojas.thesis import JOINTS
@@ -127,9 +127,9 @@ def test_reproduce_runs_the_grids_behind_claims(tmp_path: Path, monkeypatch: pyt
     assert not without.claims["claim"].str.contains("survives a larger ground force").any()
 
 
-def test_reproduce_takes_the_fastest_backend() -> None:
-    assert fastest_backend(WALK) == fastest_backend(WALK, "mujoco") == ("batch", "mujoco")
-    vectorized, engine = fastest_backend("QuadInfinity-Payload-v0")
+def test_reproduce_takes_the_fastest_engine() -> None:
+    assert fastest_engine(WALK) == fastest_engine(WALK, "mujoco") == (True, "mujoco")
+    vectorized, engine = fastest_engine("QuadInfinity-Payload-v0")
     assert vectorized
     assert engine not in ("bullet", "mujoco")
-    assert fastest_backend("QuadInfinity-Payload-v0", "mujoco") == ("single", "mujoco")
+    assert fastest_engine("QuadInfinity-Payload-v0", "mujoco") == (False, "mujoco")

@@ -13,7 +13,7 @@ the point where the observed share crosses it, for these seeds. What n episodes 
 and for every controller, so that two frontiers differ by the controllers and not by luck of the draw; they are one
 sample of the variation nonetheless. Levels off a controller's path through the bisection are not run: survival that
 falls and rises again between them stays unseen. With `grid`, every level is run with every controller, episode by
-episode so that an interruption leaves whole curves of fewer episodes behind; in the batch backend all levels of a
+episode so that an interruption leaves whole curves of fewer episodes behind; in vector environments all levels of a
 controller run side by side. There is then a half point for each controller, see `artde_gym.studies.frontier.half`.
 
 The ground force of the thesis is a grid of its own: `vary="grf_pulse.magnitude", grid=True` in scenario S1 or S2.
@@ -38,6 +38,7 @@ from typing import Any
 
 import pandas as pd
 
+from artde_gym.deprecation import takes_old_names
 from artde_gym.evaluation import statistics
 from artde_gym.evaluation.cells import CUSTOM, Cell
 from artde_gym.evaluation.evaluate import run_plan
@@ -58,6 +59,7 @@ from artde_gym.studies.frontier.table import LEVEL_COLUMNS, frontier_of
 RECORD_HZ = 10.0  # a frontier has hundreds of episodes; their traces are for a look at a fall, not for metrics
 
 
+@takes_old_names
 @writes_folder
 def frontier(
     controllers: Sequence[str | Policy] | Mapping[str, str | Policy],
@@ -87,8 +89,8 @@ def frontier(
     Args:
         controllers: as for `evaluate`.
         env_id: any registered environment of this project.
-        vary: "kind.parameter" of `artde_gym.disturbances.DISTURBANCES`, in all entries of a kind that takes several; "gains."
-            and a gain of all controllers; or an argument of the environment that is a number.
+        vary: "kind.parameter" of `artde_gym.disturbances.DISTURBANCES`, in all entries of a kind that takes several;
+            "gains." and a gain of all controllers; or an argument of the environment that is a number.
         low: smallest value, in the parameter's unit (a control period in s); there are defaults for usual paths.
         high: largest value.
         tolerance: width of the bracket to be found.

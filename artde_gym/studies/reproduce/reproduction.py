@@ -22,7 +22,7 @@ import pandas as pd
 
 from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from artde_gym.evaluation.cells import Cell
-from artde_gym.evaluation.environments import fastest_backend
+from artde_gym.evaluation.environments import fastest_engine
 from artde_gym.evaluation.evaluate import run_plan
 from artde_gym.evaluation.labels import named_controllers
 from artde_gym.evaluation.lock import writes_folder
@@ -37,7 +37,7 @@ from artde_gym.studies.frontier.search import frontier
 from artde_gym.studies.reproduce.claims import all_claims, judge
 
 ADAPTIVE, ABLATION = "artde", "tde+kd"
-EPISODES: Mapping[Backend, int] = {"batch": 10, "single": 4}
+EPISODES, SINGLE_EPISODES = 10, 4
 """Where walks run one by one, fewer of them: all seeds alike are still more often than not."""
 RECORD_EPISODES = 3  # episodes of each cell that leave their signals: to look at; compressing all takes a minute or two
 GAIN = "robust_gain_mean"  # column of a law's mean c; with a suffix for each loop of a cascade, as its gains have
@@ -104,7 +104,7 @@ def reproduce(
         controllers: likewise, without the ablation.
         ablation: whether to run it too; "artde" must be among the controllers then.
         curves: whether to run the grids of claims in these scenarios, too.
-        episodes: seeded episodes of each controller in each scenario; None for `EPISODES` of the backend.
+        episodes: seeded episodes of each controller in each scenario; None for 10, or 4 where walks run singly.
         seed: of everything.
         workers: processes; the results do not depend on it.
         engine: physics engine, in its fastest vectorized; None for the fastest of all.
@@ -123,11 +123,11 @@ def reproduce(
         raise OptionError("controllers", ABLATION, "other names; it is run by ablation=True, at gains of its own")
     if ablation and ADAPTIVE not in names:
         raise OptionError("controllers", names, f"{ADAPTIVE!r} among them, from which the ablation takes its gain")
-    vectorized, engine = fastest_backend(find_scenario(chosen[0]).env_id, engine)
+    vectorized, engine = fastest_engine(find_scenario(chosen[0]).env_id, engine)
     plan = Plan.of(
         names,
         scenario=chosen,
-        episodes=EPISODES[vectorized] if episodes is None else episodes,
+        episodes=_episodes(vectorized) if episodes is None else episodes,
         seed=seed,
         workers=workers,
         env_kwargs={"engine": engine},
@@ -155,6 +155,10 @@ def reproduce(
     text = verdicts.to_csv(index=False, lineterminator="\n")
     write_atomically(folder / "claims.csv", lambda file: file.write(text.encode()))
     return Reproduction(result, verdicts, found)
+
+
+def _episodes(vectorized: bool) -> int:
+    return EPISODES if vectorized else SINGLE_EPISODES
 
 
 def _grid(
