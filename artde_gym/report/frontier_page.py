@@ -78,7 +78,8 @@ def parts(found: Frontier) -> list[str]:
 def survival_chart(found: Frontier, *, legend: bool = False) -> Chart:
     """Draw the share of episodes without a fall over what is varied."""
     axis = found.axis
-    shown = styles(str(row["controller"]) for row in _records(found.table))
+    drawn = set(found.levels["controller"])
+    shown = styles(name for row in _records(found.table) if (name := str(row["controller"])) in drawn)
     x = Axis.of(f"{axis.path} ({axis.unit})" if axis.unit != "1" else axis.path, [axis.low, axis.high])
     chart = Chart("Share of episodes without a fall against what was varied", x, Axis("no fall (%)", 0, 104), 460, 280)
     chart.level(100 * found.survival, f"wanted: {100 * found.survival:g} %")
