@@ -44,12 +44,16 @@ class Environment(NamedTuple):
 
 
 class Range(NamedTuple):
-    """Ends and grid of a path where the user gives none, and which of its ends is the hard one."""
+    """Ends and grid of a path where the user gives none, and which of its ends is the hard one.
+
+    `duration` (s) is that of the test where it is not the robot's usual one.
+    """
 
     low: float
     high: float
     tolerance: float
     harder: Harder = "larger"
+    duration: float | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,7 +64,7 @@ class FrontierTest:
         scenario: whose disturbances it has.
         duration: s.
         when: (s) between which a varied push comes.
-        repeated: varied entries of kinds that take a list, in place of the scenario's own of that kind.
+        repeated: entries of kinds of which a parameter is varied, in place of the scenario's own of that kind.
         time_step: s, of which control periods are whole multiples.
         ranges: path -> range. Any other path needs low, high and tolerance.
     """
@@ -68,7 +72,7 @@ class FrontierTest:
     scenario: str
     duration: float
     when: tuple[float, float]
-    repeated: Mapping[str, list[dict[str, Any]]]
+    repeated: Mapping[str, Any]
     time_step: float
     ranges: Mapping[str, Range]
 

@@ -16,6 +16,7 @@ CONTROLLERS = (
     _law("atde", "TDE + one adaptive gain", law="atde"),
     _law("artde", "TDE + adaptive-robust term, as printed in the thesis", law="artde"),
     _law("artde-robust", "ARTDE with bounded gains", law="artde", preset="robust"),
+    _law("tde-stiff", "biped: TDE at a larger m_bar, with a margin to its limit", law="tde", preset="stiff"),
     _law("pid", "PID; biped: equal to TDE, quadrotor: positional, in both loops", law="pid"),
     _law("tde+c", "TDE + robust term of constant gain (ablation)", law="tde+c"),
     _law("tde+kd", "TDE at the stiffer gains equivalent to it (ablation)", law="tde+kd"),

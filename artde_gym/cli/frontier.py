@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -29,7 +30,9 @@ from artde_gym.cli.arguments import (
 )
 from artde_gym.cli.display import Display, terminal
 from artde_gym.cli.report import show_report
+from artde_gym.evaluation.store import write_atomically
 from artde_gym.kit import ROBOTS
+from artde_gym.report.frontier_page import survival_chart
 from artde_gym.studies import frontier as run_frontier
 from artde_gym.studies.frontier.console import print_frontier
 
@@ -55,35 +58,55 @@ def frontier(
     gains: Gains = None,
     vectorized: Vectorized = False,
     backend: Backend = None,
+    scenario: Annotated[
+        str | None, typer.Option(help="In place of the standard test's, comma-separated; a folder inside for each.")
+    ] = None,
+    grid: Annotated[
+        bool, typer.Option("--grid", help="Run every level, not only those of a bisection; 50 % points, too.")
+    ] = False,
+    figure: Annotated[
+        Path | None, typer.Option(help="SVG of survival over what is varied, one file a scenario.")
+    ] = None,
     allow_mixed: AllowMixed = False,
     report: Report = False,
 ) -> None:
     """Find how much of one disturbance each controller survives; the same command continues an interrupted run."""
     kwargs = environment_kwargs(env_kwargs, engine)
-    console = terminal()
-    with Display(console) as display:
-        found = run_frontier(
-            names(controllers),
-            env,
-            vary,
-            low=low,
-            high=high,
-            tolerance=tolerance,
-            harder=harder,  # pyright: ignore[reportArgumentType]  # checked there
-            survival=survival,
-            episodes=episodes,
-            seed=seed,
-            workers=processes(workers),
-            out=folder_of(out),
-            disturbances=optional_json("--disturbances", disturbances),
-            env_kwargs=kwargs,
-            gains=json_object("--gains", gains),
-            vectorized=vectorized_by(vectorized, backend),
-            allow_mixed=allow_mixed,
-            on_progress=lambda value, update: display(update, f"{vary} {value:g}"),
-        )
-    print_frontier(found, console)
-    if report and found.folder is not None:
-        show_report(found.folder, console)
-    if not found.complete:
-        raise typer.Exit(130)
+    console, folder = terminal(), folder_of(out)
+    scenarios = [None] if scenario is None else names(scenario)
+    for one in scenarios:
+        with Display(console) as display:
+            found = run_frontier(
+                names(controllers),
+                env,
+                vary,
+                low=low,
+                high=high,
+                tolerance=tolerance,
+                harder=harder,  # pyright: ignore[reportArgumentType]  # checked there
+                survival=survival,
+                episodes=episodes,
+                seed=seed,
+                workers=processes(workers),
+                out=folder if one is None else folder / one,
+                disturbances=optional_json("--disturbances", disturbances),
+                env_kwargs=kwargs,
+                gains=json_object("--gains", gains),
+                vectorized=vectorized_by(vectorized, backend),
+                scenario=one,
+                grid=grid,
+                allow_mixed=allow_mixed,
+                on_progress=lambda value, update, display=display: display(update, f"{vary} {value:g}"),
+            )
+        if len(scenarios) > 1:
+            console.rule(str(one))
+        print_frontier(found, console)
+        if figure is not None:
+            path = figure if one is None else figure.with_stem(f"{figure.stem}-{one}")
+            write_atomically(
+                path, lambda file, found=found: file.write(survival_chart(found, legend=True).file().encode())
+            )
+        if report and found.folder is not None:
+            show_report(found.folder, console)
+        if not found.complete:
+            raise typer.Exit(130)

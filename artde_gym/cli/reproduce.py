@@ -15,6 +15,7 @@ from artde_gym.errors import OptionError
 from artde_gym.evaluation.console import print_claims, print_result
 from artde_gym.sim.factory import ENGINES, resolve_engine
 from artde_gym.studies import reproduce as run_reproduction
+from artde_gym.studies.frontier.console import print_frontier
 from artde_gym.studies.reproduce.claims import confirm
 from artde_gym.studies.reproduce.reproduction import scenarios_of, titles
 
@@ -22,13 +23,21 @@ from artde_gym.studies.reproduce.reproduction import scenarios_of, titles
 def reproduce(
     robot: Annotated[str, typer.Option(help=f"{', '.join(titles())}, or all.")] = "all",
     engine: Annotated[
-        str | None, typer.Option(help=f"Physics engine: {', '.join(ENGINES)}, or both. Default: see `doctor`.")
+        str | None, typer.Option(help=f"Physics engine: {', '.join(ENGINES)}, or both. Default: the fastest.")
     ] = None,
-    episodes: Annotated[int, typer.Option(help="Seeded episodes of each controller in each scenario.")] = 10,
+    episodes: Annotated[
+        int | None,
+        typer.Option(
+            help="Seeded episodes of each controller in each scenario. Default: 10, or 4 where walks run singly."
+        ),
+    ] = None,
     scenario: Annotated[str | None, typer.Option(help="Names, comma-separated. Default: all of the robot.")] = None,
     controllers: Annotated[str | None, typer.Option(help="Names, comma-separated. Default: the robot's own.")] = None,
     ablation: Annotated[
         bool, typer.Option(help="Run TDE at ARTDE's mean gain too; on a folder that is there, only what is new.")
+    ] = False,
+    curves: Annotated[
+        bool, typer.Option("--curves", help="Run the grids of `frontier` by which some claims are judged, too.")
     ] = False,
     seed: Seed = 0,
     workers: Workers = None,
@@ -42,7 +51,7 @@ def reproduce(
 ) -> None:
     """Run the thesis' scenarios and print its tables beside ours, then each of its claims with a verdict."""
     robots = titles() if robot == "all" else [robot]
-    engines = list(ENGINES) if engine == "both" else [resolve_engine(engine)]
+    engines = list(ENGINES) if engine == "both" else [None if engine is None else resolve_engine(engine)]
     named = None if scenario is None else names(scenario)
     shares = {name: chosen for name in robots if (chosen := scenarios_of(name, named))}
     for one in named or ():
@@ -55,10 +64,11 @@ def reproduce(
             with Display(console) as display:
                 found = run_reproduction(
                     name,
-                    out / one / name,
+                    out / (one or "fastest") / name,
                     scenarios=chosen,
                     controllers=None if controllers is None else names(controllers),
                     ablation=ablation,
+                    curves=curves,
                     episodes=episodes,
                     seed=seed,
                     workers=processes(workers),
@@ -70,7 +80,9 @@ def reproduce(
                 console.rule(f"{name} in {one}")
             print_result(found.result, console)
             print_claims(found.claims, console)
-            verdicts[one] = found.claims
+            for curve in found.curves.values():
+                print_frontier(curve, console)
+            verdicts[str(one)] = found.claims
             if (report or pictures or videos) and found.result.folder is not None:
                 show_report(found.result.folder, console, pictures=pictures, videos=videos)
             if not found.result.complete:

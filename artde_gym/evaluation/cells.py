@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from artde_gym.deprecation import current_disturbances
 from artde_gym.errors import OptionError
 from artde_gym.evaluation import canonical
-from artde_gym.evaluation.environments import metrics_spec_of, single, vector, with_engine
+from artde_gym.evaluation.environments import metrics_spec_of, single, vector, vector_of_one, with_engine
 from artde_gym.evaluation.metrics import Span
 from artde_gym.scenarios import Scenario
 from artde_gym.scenarios import scenario as find_scenario
@@ -96,9 +96,7 @@ def validate_cell(vectorized: bool, cell: Cell) -> Any:
     except TypeError as error:
         raise OptionError("env_kwargs", cell.kwargs, "values that JSON can write") from error
     metrics_spec_of(cell.env_id)
-    if vectorized:
-        return vector_of(cell, 1)
-    env, options = single_of(cell)
+    env, options = vector_of([cell], vector_of_one) if vectorized else single_of(cell)
     env.reset(options=options)
     return env
 
@@ -111,6 +109,10 @@ def single_of(cell: Cell) -> tuple[Any, dict[str, Any] | None]:
     return single(cell.env_id, json.dumps({**cell.kwargs, "disturbances": {}})), options
 
 
-def vector_of(cell: Cell, size: int) -> Any:
-    """Build a vector of `size` environments."""
-    return vector(cell.env_id, json.dumps(cell.kwargs), size)
+def vector_of(cells: Sequence[Cell], build: Callable[..., Any] = vector) -> tuple[Any, dict[str, Any] | None]:
+    """Build a vector with one environment a cell, which differ by disturbances alone, and options for its resets."""
+    first = cells[0]
+    if "disturbances" not in first.kwargs:
+        return build(first.env_id, json.dumps(first.kwargs), len(cells)), None
+    options = {"disturbances": [cell.kwargs["disturbances"] for cell in cells]}
+    return build(first.env_id, json.dumps({**first.kwargs, "disturbances": {}}), len(cells)), options

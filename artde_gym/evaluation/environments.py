@@ -72,6 +72,19 @@ def with_engine(env_id: str, kwargs: Mapping[str, Any], vectorized: bool = False
     return {**kwargs, "engine": getattr(creator, "own_engine", None) if given is None else given}
 
 
+def fastest_engine(env_id: str, engine: str | None = None) -> tuple[bool, str]:
+    """Tell whether an environment is faster `vectorized` in one engine, or in any; returns the engine, too.
+
+    Raises:
+        OptionError: for an unknown engine.
+    """
+    point = gym.spec(env_id).vector_entry_point
+    own = getattr(load_env_creator(point), "own_engine", None) if isinstance(point, str) else None
+    if own is not None and engine in (None, own):
+        return True, own
+    return False, resolve_engine(engine)
+
+
 def physics_of(kwargs: Mapping[str, Any]) -> str:
     """Say in which physics an environment with arguments of `with_engine` runs."""
     name = kwargs.get("engine", "NumPy")
@@ -110,6 +123,12 @@ def vector(env_id: str, arguments: str, size: int) -> Any:
     if hasattr(creator, "own_engine"):
         given = {"engine": creator.own_engine, "autoreset_mode": AutoresetMode.DISABLED, **given}
     return gym.make_vec(env_id, size, vectorization_mode="vector_entry_point", **given)
+
+
+@functools.lru_cache(maxsize=KEPT)
+def vector_of_one(env_id: str, arguments: str, size: int = 1) -> Any:
+    """A vector of one environment, to try arguments and disturbances on; a few are kept."""
+    return vector(env_id, arguments, size)
 
 
 def drawing(env_id: str, kwargs: Mapping[str, Any], width: int) -> Any:

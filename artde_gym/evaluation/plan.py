@@ -45,6 +45,7 @@ class Plan:
             `vectorized`.
         record_hz: rate of stored signals; infinite for all of them.
         allow_mixed: whether results of other software may be continued.
+        together: whether cells that differ by disturbances alone run side by side in one vector.
     """
 
     controllers: Mapping[str, Policy | ControllerSpec]
@@ -57,6 +58,7 @@ class Plan:
     record_episodes: int | None
     record_hz: float
     allow_mixed: bool
+    together: bool = False
 
     @classmethod
     def of(
@@ -161,6 +163,5 @@ class Plan:
             Case(cell, name, item, self.gains.get(name, {}), self.seed)
             for cell, (name, item) in itertools.product(self.cells, self.controllers.items())
         ]
-        return tasks_of(
-            cases, self.episodes, self.vectorized, done, record_episodes=self.traces, record_hz=self.record_hz
-        )
+        shown: dict[str, Any] = {"record_episodes": self.traces, "record_hz": self.record_hz}
+        return tasks_of(cases, self.episodes, self.vectorized, done, **shown, together=self.together)

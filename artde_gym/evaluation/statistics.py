@@ -65,8 +65,24 @@ def improvement(ours: ArrayLike, theirs: ArrayLike) -> Estimate:
     return _central_limit(100.0 * (ratio * b - a) / b.mean(), value)  # a ratio's error, to first order
 
 
-def _bootstrap(samples: tuple[Array, ...], value: float, statistic: Callable[..., Array]) -> Estimate:
-    count = len(samples[0])
+def change(ours: ArrayLike, theirs: ArrayLike) -> Estimate:
+    """By how many percent the mean of ours is above that of theirs, for values that are no pairs."""
+    a, b = _finite(ours), _finite(theirs)
+    value = 100.0 * (float(a.mean() / b.mean()) - 1.0) if len(a) and len(b) else np.nan
+    few = min(len(a), len(b))
+    if few < 2:
+        return Estimate(value, np.nan, np.nan, few)
+
+    def statistic(x: Array, y: Array, axis: int) -> Array:
+        return 100.0 * (x.mean(axis=axis) / y.mean(axis=axis) - 1.0)
+
+    return _bootstrap((a, b), value, statistic, paired=False)
+
+
+def _bootstrap(
+    samples: tuple[Array, ...], value: float, statistic: Callable[..., Array], *, paired: bool = True
+) -> Estimate:
+    count = min(map(len, samples))
     if count < 2:
         return Estimate(value, np.nan, np.nan, count)
     if all(np.ptp(sample) == 0 for sample in samples):
@@ -77,7 +93,7 @@ def _bootstrap(samples: tuple[Array, ...], value: float, statistic: Callable[...
         n_resamples=RESAMPLES,
         confidence_level=CONFIDENCE,
         method="percentile",
-        paired=True,
+        paired=paired,
         rng=np.random.default_rng(0),
     ).confidence_interval
     return Estimate(value, float(interval.low), float(interval.high), count)

@@ -18,6 +18,10 @@ CHUNK = 2500
 """Most episodes that run at once in a vector environment: no result depends on it, and more would be little faster."""
 
 
+SIDE_BY_SIDE = 128
+"""As `CHUNK`, of cells that run side by side: more would be little faster, and an interruption loses what runs."""
+
+
 class Case(NamedTuple):
     """One controller in one cell; `seed` is that of all its episodes."""
 
@@ -31,7 +35,8 @@ class Case(NamedTuple):
 class Task(NamedTuple):
     """Episodes of one controller that run at once: a single one, or a chunk. The first `record_episodes` leave traces.
 
-    `metrics` are the registered ones that the process must know.
+    `cells` are those of the episodes, which differ from `cell` by name and disturbances alone. `metrics` are the
+    registered ones that the process must know.
     """
 
     vectorized: bool
@@ -43,6 +48,7 @@ class Task(NamedTuple):
     seeds: list[int]
     record_hz: float
     record_episodes: int
+    cells: tuple[Cell, ...]
     metrics: tuple[str, ...] = ()
 
 
@@ -91,6 +97,7 @@ def tasks_of(
     *,
     record_episodes: int = 0,
     record_hz: float = 100.0,
+    together: bool = False,
 ) -> Iterator[Task]:
     """Portion out the episodes of all cases, chunk by chunk, so that an interruption leaves whole comparisons behind.
 
@@ -101,33 +108,47 @@ def tasks_of(
         done: cell's name, controller and number of the episodes that are left out.
         record_episodes: the first so many episodes of each case leave traces.
         record_hz: rate of the traces.
+        together: whether cases of one controller, whose cells differ by disturbances alone, run at once in a vector.
     """
-    for chunk in chunks_of(episodes, 1 if not vectorized else CHUNK):
-        for case in cases:
-            left = [episode for episode in chunk if (case.cell.name, case.controller, episode) not in done]
+    groups = _groups(cases) if together and vectorized else [[case] for case in cases]
+    largest = max(map(len, groups), default=1)
+    size = 1 if not vectorized else max(1, SIDE_BY_SIDE // largest) if largest > 1 else CHUNK
+    for chunk in chunks_of(episodes, size):
+        for group in groups:
+            left = [
+                (case, episode)
+                for case, episode in itertools.product(group, chunk)
+                if (case.cell.name, case.controller, episode) not in done
+            ]
             if left:
-                yield task_of(case, left, vectorized, record_episodes=record_episodes, record_hz=record_hz)
+                left.sort(key=lambda run: run[1] >= record_episodes)  # a vector leaves traces of its first ones
+                yield _task(left, vectorized, record_episodes, record_hz)
+
+
+def _groups(cases: Collection[Case]) -> list[list[Case]]:
+    """Put cases together that one vector and one policy can run."""
+    groups: dict[str, list[Case]] = {}
+    for case in cases:
+        kwargs = {name: value for name, value in case.cell.kwargs.items() if name != "disturbances"}
+        own = "disturbances" in case.cell.kwargs
+        key = (case.controller, case.seed, case.cell.env_id, kwargs, own, case.cell.phases, case.gains)
+        groups.setdefault(repr(key), []).append(case)
+    return list(groups.values())
 
 
 def task_of(
     case: Case, episodes: Iterable[int], vectorized: bool, *, record_episodes: int = 0, record_hz: float = 100.0
 ) -> Task:
     """Put some episodes of a case into one task."""
-    numbers = list(episodes)
-    seeds = [episode_seed(case.seed, episode) for episode in numbers]
-    shown = sum(episode < record_episodes for episode in numbers)
-    return Task(
-        vectorized,
-        case.cell,
-        case.controller,
-        case.policy,
-        case.gains,
-        numbers,
-        seeds,
-        record_hz,
-        shown,
-        tuple(METRICS),
-    )
+    return _task([(case, episode) for episode in episodes], vectorized, record_episodes, record_hz)
+
+
+def _task(runs: list[tuple[Case, int]], vectorized: bool, record_episodes: int, record_hz: float) -> Task:
+    case, numbers = runs[0][0], [episode for _, episode in runs]
+    seeds = [episode_seed(one.seed, episode) for one, episode in runs]
+    shown, cells = sum(episode < record_episodes for episode in numbers), tuple(one.cell for one, _ in runs)
+    who = (case.cell, case.controller, case.policy, case.gains)
+    return Task(vectorized, *who, numbers, seeds, record_hz, shown, cells, tuple(METRICS))
 
 
 def chunks_of(episodes: int, size: int) -> list[range]:
@@ -142,9 +163,11 @@ def run_task(task: Task, on_progress: Callable[[float], None]) -> list[Episode]:
     require_metrics(task.metrics)
     options: dict[str, Any] = {"record_hz": task.record_hz, "phases": task.cell.phases, "on_progress": on_progress}
     if task.vectorized:
-        env = vector_of(task.cell, len(task.seeds))
+        env, reset_options = vector_of(task.cells)
         policy = policy_for(task.policy, env, task.gains)
-        return run_vector(env, policy, task.seeds, record_episodes=task.record_episodes, **options)
+        return run_vector(
+            env, policy, task.seeds, options=reset_options, record_episodes=task.record_episodes, **options
+        )
     env, reset_options = single_of(task.cell)
     policy = policy_for(task.policy, env, task.gains)
     results = [run_episode(env, policy, seed, options=reset_options, **options) for seed in task.seeds]
@@ -156,7 +179,7 @@ def labels_of(task: Task, number: int) -> dict[str, Any]:
     return {
         "controller": task.controller,
         "env": task.cell.env_id,
-        "scenario": task.cell.name,
+        "scenario": task.cells[number].name,
         "seed": task.seeds[number],
         "episode": task.episodes[number],
     }

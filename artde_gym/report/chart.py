@@ -189,6 +189,16 @@ class Chart:
         (across,), (up,) = self._points([x], [y])
         self._parts.append(f'<text x="{across:.1f}" y="{up:.1f}" text-anchor="middle">{escape(text)}</text>')
 
+    def legend(self, shown: Mapping[str, Style]) -> None:
+        """Name the styles in the lower left corner, for a chart that stands alone."""
+        for i, (name, look) in enumerate(reversed(list(shown.items()))):
+            up = self.height - BOTTOM - 14 - 16 * i
+            shape = SHAPES.get(look.marker, SHAPES["o"])
+            self._parts.append(
+                f'<path class="marker" style="--c:{look.color}" transform="translate({LEFT + 14} {up})" d="{shape}"/>'
+                f'<text x="{LEFT + 24}" y="{up + 4}">{escape(name)}</text>'
+            )
+
     def svg(self) -> str:
         name = escape(self._name, quote=True)
         return (

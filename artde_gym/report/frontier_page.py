@@ -16,6 +16,7 @@ from artde_gym.palette import styles
 from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.html import Cell, figure, table
 from artde_gym.studies.frontier.axis import Axis as Varied
+from artde_gym.studies.frontier.half import half_text
 from artde_gym.studies.frontier.result import RECORD, Frontier, value_text
 
 Rows = list[dict[Any, Any]]
@@ -32,10 +33,12 @@ def read_frontier(folder: Path) -> tuple[Frontier, dict[str, Any]]:
         wanted = record["configuration"] = current_configuration(record["configuration"])
         texts = [(folder / name).read_text(encoding="utf-8") for name in ("frontier.csv", "levels.csv")]
         table, levels = (parse_table(text, ("controller", "relation")) for text in texts)
+        halves = folder / "half.csv"
+        half = parse_table(halves.read_text(encoding="utf-8"), ("controller",)) if halves.exists() else None
         varied, survival = Varied(**wanted["axis"]), wanted["survival"]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise StoreError("frontier", str(folder), "a folder in which at least one level was finished") from error
-    return Frontier(table, levels, varied, survival, folder, bool(record.get("complete"))), record
+    return Frontier(table, levels, varied, survival, folder, bool(record.get("complete")), half), record
 
 
 def answer(found: Frontier) -> tuple[str, list[str]]:
@@ -58,19 +61,6 @@ def parts(found: Frontier) -> list[str]:
     """Chart and tables."""
     axis = found.axis
     shown = styles(str(row["controller"]) for row in _records(found.table))
-    x = Axis.of(f"{axis.path} ({axis.unit})" if axis.unit != "1" else axis.path, [axis.low, axis.high])
-    chart = Chart("Share of episodes without a fall against what was varied", x, Axis("no fall (%)", 0, 104), 460, 280)
-    chart.level(100 * found.survival, f"wanted: {100 * found.survival:g} %")
-    for i, (name, look) in enumerate(shown.items()):
-        rows = [row for row in _records(found.levels) if row["controller"] == name]
-        shift = (i - (len(shown) - 1) / 2) * 0.012 * (axis.high - axis.low)
-        places = [row["value"] + shift for row in rows]
-        chart.line(places, [100 * row["rate"] for row in rows], look, text=name, kind="path")
-        for place, row in zip(places, rows, strict=True):
-            chart.interval(place, 100 * row["low"], 100 * row["high"], look)
-            chart.marker(
-                place, 100 * row["rate"], look, f"{name} at {row['value']:g}: {row['survived']}/{row['episodes']}"
-            )
     caption = "Survival with 95 % intervals (Wilson); markers side by side are one level."
     lines = [
         [Cell(f"{row['value']:g}", row["value"]), row["controller"], Cell(f"{row['survived']} of {row['episodes']}",
@@ -79,9 +69,45 @@ def parts(found: Frontier) -> list[str]:
     ]  # fmt: skip
     unit = "" if axis.unit == "1" else f" ({axis.unit})"
     return [
-        figure(caption, {"": chart.svg()}, shown),
+        figure(caption, {"": survival_chart(found).svg()}, shown),
+        *_half(found),
         table("Every level that was run", [f"{axis.path}{unit}", "controller", "no fall", "95 % interval (%)"], lines),
     ]
+
+
+def survival_chart(found: Frontier, *, legend: bool = False) -> Chart:
+    """Draw the share of episodes without a fall over what is varied."""
+    axis = found.axis
+    drawn = set(found.levels["controller"])
+    shown = styles(name for row in _records(found.table) if (name := str(row["controller"])) in drawn)
+    x = Axis.of(f"{axis.path} ({axis.unit})" if axis.unit != "1" else axis.path, [axis.low, axis.high])
+    chart = Chart("Share of episodes without a fall against what was varied", x, Axis("no fall (%)", 0, 104), 460, 280)
+    chart.level(100 * found.survival, f"wanted: {100 * found.survival:g} %")
+    if found.half is not None:
+        chart.level(50, "half")
+    apart = min(0.012 * (axis.high - axis.low), 0.5 * axis.tolerance / len(shown))
+    for i, (name, look) in enumerate(shown.items()):
+        rows = [row for row in _records(found.levels) if row["controller"] == name]
+        shift = (i - (len(shown) - 1) / 2) * apart
+        places = [row["value"] + shift for row in rows]
+        chart.line(places, [100 * row["rate"] for row in rows], look, text=name, kind="path")
+        for place, row in zip(places, rows, strict=True):
+            chart.interval(place, 100 * row["low"], 100 * row["high"], look)
+            chart.marker(
+                place, 100 * row["rate"], look, f"{name} at {row['value']:g}: {row['survived']}/{row['episodes']}"
+            )
+    if legend:
+        chart.legend(shown)
+    return chart
+
+
+def _half(found: Frontier) -> list[str]:
+    if found.half is None:
+        return []
+    unit = "" if found.axis.unit == "1" else f" ({found.axis.unit})"
+    heads = ["controller", f"half survive at{unit}"]
+    rows = [[row["controller"], Cell(half_text(row, found.axis), row["half"])] for row in _records(found.half)]
+    return [table("Half points with 95 % intervals (bootstrap over seeds, no narrower than the grid)", heads, rows)]
 
 
 def _sentence(row: dict[Any, Any], found: Frontier) -> str:

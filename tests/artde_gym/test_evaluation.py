@@ -362,7 +362,8 @@ def test_the_ablation_is_as_stiff_as_artde_was_in_the_same_scenario(
         record = json.loads((tmp_path / "ablation" / name / "summary.json").read_text())
         gains[name] = record["configuration"]["gains"]["tde+kd"]["c"]
         assert gains[name] == mean
-        again = evaluate(["tde+kd"], scenario=name, episodes=2, gains={"tde+kd": {"c": mean}})
+        own: dict[str, Any] = {"gains": {"tde+kd": {"c": mean}}, "env_kwargs": {"engine": "mujoco"}}
+        again = evaluate(["tde+kd"], scenario=name, episodes=2, **own)
         assert again.values(name, "tde+kd", "rmse_deg").tobytes() == (
             found.result.values(name, "tde+kd", "rmse_deg").tobytes()
         )

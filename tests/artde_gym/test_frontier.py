@@ -162,7 +162,7 @@ def test_every_default_is_an_axis_and_every_level_of_it_is_in_the_grammar(
         assert {varied.levels[0], varied.levels[-1]} == {default.low, default.high}
         assert np.abs(np.diff(varied.levels)).max() <= default.tolerance * (1 + 1e-5)
         given_, arguments = standard_test(env_id, path, {})
-        assert arguments == {"duration": duration}
+        assert arguments == {"duration": default.duration or duration}
         for value in varied.levels:
             disturbances, _ = varied.place(value, given_, arguments)
             Disturbances.parse(disturbances, sites, joints, robot)

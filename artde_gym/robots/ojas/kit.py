@@ -70,13 +70,14 @@ _FRONTIER = FrontierTest(
         "push": [random_push("chest", _STRIDE)],
         "actuator_effectiveness": [{"joint": "all"}],
         "initial_pose": [{"joint": "all"}],
+        "grf_pulse": {"shape": "double_hump", "duration": 1.0, "trigger": "contact"},
     },
     time_step=0.001,
     ranges={
         "push.magnitude": Range(0.0, 60.0, 2.0),
         "payload.mass": Range(0.5, 5.0, 0.25),
-        "grf_pulse.magnitude": Range(0.0, 200.0, 10.0),
-        "grf_pulse.share": Range(0.0, 1.0, 0.02),
+        "grf_pulse.magnitude": Range(20.0, 60.0, 2.0, duration=20.0),
+        "grf_pulse.share": Range(0.2, 0.7, 0.02, duration=20.0),
         "friction.coefficient": Range(0.05, 0.8, 0.05, "smaller"),
         "slope.pitch_deg": Range(0.0, 10.0, 0.5),
         "slope.roll_deg": Range(0.0, 10.0, 0.5),
@@ -89,6 +90,7 @@ _FRONTIER = FrontierTest(
         "mass_scale.factor": Range(1.0, 2.0, 0.05),
         "control_period": Range(0.001, 0.02, 0.001),
         "speed": Range(0.0, 0.25, 0.01),
+        "gains.m_bar": Range(0.03, 0.09, 0.006),
     },
 )
 
@@ -128,7 +130,7 @@ KIT = RobotKit(
         }
     ),
     scenarios=_SCENARIOS,
-    reproduced=(("S1", "S2", "S3", "S1-L4", "S2-L4", "S3-L4"), ("tde", "atde", "artde")),
+    reproduced=(tuple(entry.name for entry in _SCENARIOS), ("tde", "atde", "artde", "tde-stiff")),
     reported=REPORTED,
     frontier=_FRONTIER,
     motion=Motion("walk", 6.0, 2.0),

@@ -18,6 +18,9 @@ from artde_gym.studies.frontier.standard import standard_for
 FINEST = 1e-6  # tolerance relative to the ends; finer steps would drown in the digits of a level's name
 
 
+GAINS = "gains"
+"""Kind of a path to a gain of all controllers."""
+GAIN_UNITS = {"m_bar": "kg m^2"}
 ARGUMENT_UNITS = {"control_period": "s", "speed": "m/s", "step_duration": "s", "duration": "s"}
 
 
@@ -26,8 +29,8 @@ class Axis:
     """One number to vary, from `low` to `high` in steps of `tolerance`, all in `unit`.
 
     Attributes:
-        kind: of the disturbance; None for an argument of the environment.
-        name: of the disturbance's parameter, or of the argument.
+        kind: of the disturbance; None for an argument of the environment, "gains" for a gain.
+        name: of the disturbance's parameter, of the argument, or of the gain.
     """
 
     kind: str | None
@@ -55,9 +58,13 @@ class Axis:
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Disturbances and arguments of the environment with `value` in its place, the given ones left alone.
 
+        A gain has no place among them.
+
         Raises:
             OptionError: if the varied disturbance takes a list and none is given.
         """
+        if self.kind == GAINS:
+            return dict(disturbances), dict(arguments)
         if self.kind is None:
             return dict(disturbances), {**arguments, self.name: value}
         return placed(disturbances, self.kind, self.name, value), dict(arguments)
@@ -86,7 +93,7 @@ def axis(
     tolerance: float | None = None,
     harder: Harder | None = None,
 ) -> Axis:
-    """The axis at `path`: "kind.parameter" of `artde_gym.disturbances.DISTURBANCES`, or an argument of the environment.
+    """The axis at `path`: "kind.parameter" of `artde_gym.disturbances.DISTURBANCES`, "gains.name", or an argument.
 
     Raises:
         UnknownNameError: if there is no number at this path.
@@ -135,6 +142,9 @@ def _find(env_id: str, path: str) -> tuple[str | None, str, str]:
         and isinstance(argument.default, (int, float))
         and not isinstance(argument.default, bool)
     ]
+    kind, _, gain = path.partition(".")
+    if kind == GAINS and gain:
+        return GAINS, gain, GAIN_UNITS.get(gain, "1")  # whether controllers have it, they know themselves
     if path in disturbances:
         return disturbances[path]
     if path in numbers:
@@ -150,7 +160,7 @@ def _check(varied: Axis, time_step: float | None) -> None:
     if not finest <= varied.tolerance <= span * (1 + FINEST):  # 0.3 - 0.2 is less than 0.1
         raise OptionError("tolerance", varied.tolerance, f"{finest:g} to high - low, which is {span:g}")
     quantum = time_step if varied.path == "control_period" else None
-    if varied.kind is not None:
+    if varied.kind not in (None, GAINS):
         (parameter,) = (p for p in DISTURBANCES[varied.kind].parameters if p.name == varied.name)
         for field, value in (("low", varied.low), ("high", varied.high)):
             if not parameter.low <= value <= parameter.high:

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from artde_gym.studies.frontier.half import half_text
 from artde_gym.studies.frontier.result import Frontier, value_text
 
 
@@ -31,6 +32,8 @@ def print_frontier(found: Frontier, console: Console) -> None:
         )
         console.print(Text(note, style="dim"))
         console.print(_table(found))
+        if found.half is not None:
+            _print_grid(found, console)
     if not found.complete:
         console.print("Interrupted: the same command continues; finished episodes are kept.")
     if found.folder is not None:
@@ -46,6 +49,27 @@ def _table(found: Frontier) -> Table:
         fails = f"{row[hard]:g}" if math.isfinite(row[hard]) else "-"
         table.add_row(str(row["controller"]), value_text(row, "1"), _share(row, easy), fails, _share(row, hard))
     return table
+
+
+def _print_grid(found: Frontier, console: Console) -> None:
+    """Print all falls of a grid, and where half of the episodes end in one."""
+    assert found.half is not None
+    unit = "" if found.axis.unit == "1" else f" ({found.axis.unit})"
+    names = found.table["controller"].tolist()
+    falls = Table(f"falls at{unit}", *names, box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
+    for value, level in found.levels.groupby("value"):
+        rows = {row["controller"]: row for row in level.to_dict(orient="records")}
+        falls.add_row(f"{value:g}", *(_falls(rows.get(name)) for name in names))
+    console.print(falls)
+    console.print(
+        "Half of the episodes end without a fall at (95 % interval: bootstrap over seeds, no narrower than the grid):"
+    )
+    for row in found.half.to_dict(orient="records"):
+        console.print(f"  {row['controller']}: {half_text(row, found.axis)}{unit}")
+
+
+def _falls(row: dict[Any, Any] | None) -> str:
+    return "" if row is None else f"{row['episodes'] - row['survived']}/{row['episodes']}"
 
 
 def _share(row: dict[Any, Any], end: str) -> str:

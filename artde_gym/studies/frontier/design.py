@@ -10,7 +10,7 @@ from artde_gym.errors import OptionError, suggest_names
 from artde_gym.evaluation.cells import Cell, validate_cell
 from artde_gym.evaluation.environments import arguments_of
 from artde_gym.evaluation.plan import Plan
-from artde_gym.studies.frontier.axis import Axis
+from artde_gym.studies.frontier.axis import GAINS, Axis
 from artde_gym.studies.frontier.standard import standard_test
 
 
@@ -31,11 +31,11 @@ class Design:
     arguments: Mapping[str, Any]
 
     @classmethod
-    def of(cls, plan: Plan, axis: Axis, survival: float) -> Design:
+    def of(cls, plan: Plan, axis: Axis, survival: float, scenario: str | None = None) -> Design:
         """Make a design from a plan with one cell; without disturbances of its own, it is the robot's standard test.
 
         Raises:
-            OptionError, DisturbanceError: if the test, or an end of the axis, is not allowed.
+            UnknownNameError, OptionError, DisturbanceError: if the test, or an end of the axis, is not allowed.
         """
         if not (isinstance(survival, (int, float)) and 0 < survival <= 1):
             raise OptionError("survival", survival, "above 0 up to 1")
@@ -44,13 +44,21 @@ class Design:
         disturbances = arguments.pop("disturbances", None)
         _check_arguments(cell.env_id, plan.vectorized, axis, arguments)
         if disturbances is None:
-            disturbances, arguments = standard_test(cell.env_id, axis.path, arguments)
+            disturbances, arguments = standard_test(cell.env_id, axis.path, arguments, scenario)
+        elif scenario is not None:
+            raise OptionError("disturbances", disturbances, "None, if a scenario brings them")
         design = cls(axis, survival, disturbances, arguments)
         for end in (axis.levels[0], axis.levels[-1]):
             placed = design.at(end, cell)
             if axis.kind is None:  # nothing here knows the argument's range: let the environment refuse it at once
                 validate_cell(plan.vectorized, placed)
         return design
+
+    def gains_at(self, value: float, plan: Plan) -> Mapping[str, dict[str, Any]]:
+        """Return the gains of a plan's controllers at one level."""
+        if self.axis.kind != GAINS:
+            return plan.gains
+        return {name: {**plan.gains.get(name, {}), self.axis.name: value} for name in plan.controllers}
 
     def at(self, value: float, cell: Cell) -> Cell:
         """Return a cell with this test at one level."""

@@ -29,6 +29,9 @@ class Frontier:
         survival: share of episodes to be survived.
         folder: where everything is stored, if it is.
         complete: False if the search was interrupted.
+        half: of a grid, one row a controller: the value at which `half` of the episodes are survived with its 95 %
+            interval `low`, `high`, over so many `episodes` a level; see `artde_gym.studies.frontier.half`.
+        episodes: of a grid that has just been run, those of all levels, whose numbers are the scenarios.
     """
 
     table: pd.DataFrame
@@ -37,6 +40,8 @@ class Frontier:
     survival: float
     folder: Path | None = None
     complete: bool = True
+    half: pd.DataFrame | None = None
+    episodes: pd.DataFrame | None = None
 
 
 def value_text(row: Mapping[Any, Any], unit: str) -> str:

@@ -12,37 +12,48 @@ the point where the observed share crosses it, for these seeds. What n episodes 
 95 % interval at both ends of the bracket: with 18 of 20 survived it is 70 to 97 %. Seeds are the same at every level
 and for every controller, so that two frontiers differ by the controllers and not by luck of the draw; they are one
 sample of the variation nonetheless. Levels off a controller's path through the bisection are not run: survival that
-falls and rises again between them stays unseen.
+falls and rises again between them stays unseen. With `grid`, every level is run with every controller, episode by
+episode so that an interruption leaves whole curves of fewer episodes behind; in vector environments all levels of a
+controller run side by side. There is then a half point for each controller, see `artde_gym.studies.frontier.half`.
+
+The ground force of the thesis is a grid of its own: `vary="grf_pulse.magnitude", grid=True` in scenario S1 or S2.
 
     frontier.csv     one row a controller
     levels.csv       one row a tested level and controller
     frontier.png     survival against the varied value
+    half.csv         one row a controller, of a grid
     frontier.json    configuration and provenance, written before the first episode
     levels/<value>/  the results folder of each level, see `artde_gym.evaluation.store`
+    grid/            in place of those, the results folder of a whole grid, whose scenarios are the levels by number
 """
 
 from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
 from artde_gym.deprecation import takes_old_names
 from artde_gym.evaluation import statistics
-from artde_gym.evaluation.cells import CUSTOM
+from artde_gym.evaluation.cells import CUSTOM, Cell
 from artde_gym.evaluation.evaluate import run_plan
 from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.plan import Plan
+from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.evaluation.tasks import Update
 from artde_gym.kit import Harder
-from artde_gym.studies.frontier.axis import axis
+from artde_gym.studies.frontier.axis import GAINS, axis
 from artde_gym.studies.frontier.bisection import search
 from artde_gym.studies.frontier.design import Design
+from artde_gym.studies.frontier.half import half_points
 from artde_gym.studies.frontier.result import Frontier
-from artde_gym.studies.frontier.store import FrontierStore
+from artde_gym.studies.frontier.store import GRID, FrontierStore
 from artde_gym.studies.frontier.table import LEVEL_COLUMNS, frontier_of
 
 RECORD_HZ = 10.0  # a frontier has hundreds of episodes; their traces are for a look at a fall, not for metrics
@@ -68,16 +79,18 @@ def frontier(
     env_kwargs: Mapping[str, Any] | None = None,
     gains: Mapping[str, Mapping[str, Any]] | None = None,
     vectorized: bool = False,
+    scenario: str | None = None,
+    grid: bool = False,
     allow_mixed: bool = False,
     on_progress: Callable[[float, Update], None] | None = None,
 ) -> Frontier:
-    """Find by bisection the hardest value of one disturbance that each controller survives.
+    """Find the hardest value of one disturbance that each controller survives, by bisection or on a whole grid.
 
     Args:
         controllers: as for `evaluate`.
         env_id: any registered environment of this project.
         vary: "kind.parameter" of `artde_gym.disturbances.DISTURBANCES`, in all entries of a kind that takes several;
-            or an argument of the environment that is a number.
+            "gains." and a gain of all controllers; or an argument of the environment that is a number.
         low: smallest value, in the parameter's unit (a control period in s); there are defaults for usual paths.
         high: largest value.
         tolerance: width of the bracket to be found.
@@ -91,6 +104,8 @@ def frontier(
         disturbances: in place of the standard test's; the environment's own duration is then kept, too.
         env_kwargs: arguments of the environment.
         gains: as for `evaluate`, also `vectorized` and `allow_mixed`.
+        scenario: whose disturbances and arguments the standard test takes in place of its own scenario's.
+        grid: run all levels, not only those on a path through the bisection.
         on_progress: called with the value of the running level and the progress of its episodes.
 
     Returns:
@@ -113,9 +128,10 @@ def frontier(
         record_hz=RECORD_HZ,
         allow_mixed=allow_mixed,
     )
-    design = Design.of(plan, axis(plan.cells[0].env_id, vary, low, high, tolerance, harder), survival)
-    store = None if out is None else FrontierStore(Path(out), _configuration(plan, design), allow_mixed)
-    return _Levels(plan, design, store, on_progress).search()
+    design = Design.of(plan, axis(plan.cells[0].env_id, vary, low, high, tolerance, harder), survival, scenario)
+    configuration = {**_configuration(plan, design), **({"grid": True} if grid else {})}
+    store = None if out is None else FrontierStore(Path(out), configuration, allow_mixed)
+    return _Levels(plan, design, store, on_progress).search(grid=grid)
 
 
 def _configuration(plan: Plan, design: Design) -> dict[str, Any]:
@@ -145,12 +161,16 @@ class _Levels:
     ) -> None:
         self._plan, self._design, self._store, self._on_progress = plan, design, store, on_progress
         self._rows: list[dict[str, Any]] = []
+        self._episodes: pd.DataFrame | None = None
 
-    def search(self) -> Frontier:
+    def search(self, *, grid: bool) -> Frontier:
         """Run the levels until all brackets are found, or the user interrupts."""
         complete = True
         try:
-            search(len(self._design.axis.levels), list(self._plan.controllers), self._run)
+            if grid:
+                complete = self._run_all()
+            else:
+                search(len(self._design.axis.levels), list(self._plan.controllers), self._run)
         except KeyboardInterrupt:
             complete = False
         except Exception:
@@ -164,21 +184,56 @@ class _Levels:
                 self._store.draw(found)
         return found
 
+    def _run_all(self) -> bool:
+        """Run all levels with all controllers; returns whether this was not interrupted."""
+        levels, (cell,) = self._design.axis.levels, self._plan.cells
+        cells = tuple(self._design.at(value, cell)._replace(name=str(i)) for i, value in enumerate(levels))
+        if self._design.axis.kind == GAINS:
+            plans = [
+                (self._plan_at(value, cell), f"levels/{value:.10g}") for value, cell in zip(levels, cells, strict=True)
+            ]
+        else:
+            plans = [(dataclasses.replace(self._plan, cells=cells, together=True), GRID)]
+        complete, parts = True, []
+        for plan, folder in plans:
+            result = self._run_plan(plan, folder) if complete else Result(pd.DataFrame(), complete=False)
+            complete = result.complete
+            parts.append(result.episodes)
+        self._episodes = pd.concat(parts, ignore_index=True)
+        found = Result(self._episodes)
+        for i, name in itertools.product(range(len(levels)), self._plan.controllers):
+            self._count(found, str(i), levels[i], name)
+        return complete
+
+    def _plan_at(self, value: float, cell: Cell) -> Plan:
+        return dataclasses.replace(self._plan, cells=(cell,), gains=self._design.gains_at(value, self._plan))
+
+    def _run_plan(self, plan: Plan, folder: str) -> Result:
+        """Run a plan whose cells are levels by number, into a folder within that of the frontier."""
+        levels, on_progress = self._design.axis.levels, self._on_progress
+        tell = on_progress and (lambda update: on_progress(levels[int(update.task.cell.name)], update))
+        return run_plan(plan, None if self._store is None else self._store.path / folder, tell)
+
+    def _count(self, result: Result, scenario: str, value: float, name: str) -> bool:
+        """Count a controller's falls at a level, and say whether it survived."""
+        if result.episodes.empty or result.rows(scenario, name).empty:
+            return False
+        falls, rate = result.falls(scenario, name)
+        share = statistics.rate(rate.n - falls, rate.n)
+        row = (value, name, rate.n, rate.n - falls, *share[:3])
+        self._rows.append(dict(zip(LEVEL_COLUMNS, row, strict=True)))
+        return share.value >= self._design.survival
+
     def _run(self, index: int, names: list[str]) -> dict[str, bool]:
         """Run a level with some of the controllers, and say which of them survived it."""
         value = self._design.axis.levels[index]
         plan = self._plan.only(names, self._design.at(value, self._plan.cells[0]))
+        plan = dataclasses.replace(plan, gains=self._design.gains_at(value, plan))
         folder = None if self._store is None else self._store.level(value)
         result = run_plan(plan, folder, self._on_progress and functools.partial(self._on_progress, value))
         if not result.complete:
             raise KeyboardInterrupt
-        survived: dict[str, bool] = {}
-        for name in names:
-            falls, rate = result.falls(CUSTOM, name)
-            share = statistics.rate(rate.n - falls, rate.n)
-            survived[name] = share.value >= self._design.survival
-            row = (value, name, rate.n, rate.n - falls, *share[:3])
-            self._rows.append(dict(zip(LEVEL_COLUMNS, row, strict=True)))
+        survived = {name: self._count(result, CUSTOM, value, name) for name in names}
         if self._store is not None:
             self._store.write(self._found(complete=False))
         return survived
@@ -186,4 +241,8 @@ class _Levels:
     def _found(self, complete: bool) -> Frontier:
         folder = None if self._store is None else self._store.path
         names = list(self._plan.controllers)
-        return frontier_of(self._design.axis, names, self._rows, self._design.survival, folder, complete)
+        found = frontier_of(self._design.axis, names, self._rows, self._design.survival, folder, complete)
+        if self._episodes is None:
+            return found
+        found = dataclasses.replace(found, episodes=self._episodes)
+        return dataclasses.replace(found, half=half_points(found))

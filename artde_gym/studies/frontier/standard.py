@@ -9,7 +9,7 @@ from typing import Any
 from artde_gym.errors import OptionError
 from artde_gym.evaluation.environments import robot_of
 from artde_gym.kit import ROBOTS, FrontierTest
-from artde_gym.scenarios import SCENARIOS
+from artde_gym.scenarios import scenario as find_scenario
 
 
 def standard_for(env_id: str) -> FrontierTest | None:
@@ -17,17 +17,32 @@ def standard_for(env_id: str) -> FrontierTest | None:
     return ROBOTS[robot_of(env_id)].frontier
 
 
-def standard_test(env_id: str, path: str, arguments: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+def standard_test(
+    env_id: str, path: str, arguments: Mapping[str, Any], scenario: str | None = None
+) -> tuple[dict[str, Any], dict[str, Any]]:
     """Disturbances and arguments of the standard test in which `path` is varied; see `frontier`.
 
+    Args:
+        env_id: of the environment.
+        path: that is varied.
+        arguments: of the environment, which are kept.
+        scenario: in place of the test's own.
+
     Raises:
-        OptionError: if the environment's robot has no standard test, or the episode ends before the push.
+        UnknownNameError: for an unknown scenario.
+        OptionError: if the environment's robot has no standard test, the scenario is another robot's, or the episode
+            ends before the push.
     """
     standard = standard_for(env_id)
     if standard is None:
         raise OptionError("disturbances", None, f"a mapping: {env_id} has no standard test")
-    arguments = dict(arguments) if path == "duration" else {"duration": standard.duration, **arguments}
-    disturbances: dict[str, Any] = copy.deepcopy(dict(SCENARIOS[standard.scenario].disturbances))
+    test = find_scenario(scenario or standard.scenario)
+    if robot_of(test.env_id) != robot_of(env_id):
+        raise OptionError("scenario", scenario, f"one of the robot in {env_id}")
+    own = standard.ranges[path].duration if path in standard.ranges else None
+    usual = {} if path == "duration" else {"duration": own or standard.duration}
+    arguments = {**usual, **(test.kwargs if scenario else {}), **arguments}
+    disturbances: dict[str, Any] = copy.deepcopy(dict(test.disturbances))
     kind = path.split(".")[0]
     if kind in standard.repeated:
         disturbances[kind] = copy.deepcopy(standard.repeated[kind])

@@ -11,6 +11,8 @@ from artde_gym.evaluation.provenance import MIXED, continued, provenance
 from artde_gym.evaluation.store import claim, plain_configuration, write_atomically
 from artde_gym.studies.frontier.result import RECORD, Frontier
 
+GRID = "grid"
+
 
 class FrontierStore:
     """The folder of one frontier, claimed by its record."""
@@ -19,7 +21,7 @@ class FrontierStore:
         self.path = path
         self._configuration = plain_configuration(configuration)
         before = claim(path, RECORD, self._configuration)
-        begun = before if (path / "levels").exists() else None
+        begun = before if self._begun else None
         self._provenance = continued(path, begun, provenance(), allow_mixed=allow_mixed)
         if before is None or MIXED in self._provenance:
             self._write_record(None)
@@ -28,7 +30,8 @@ class FrontierStore:
         return self.path / "levels" / f"{value:.10g}"
 
     def write(self, found: Frontier) -> None:
-        for name, frame in (("frontier.csv", found.table), ("levels.csv", found.levels)):
+        half = () if found.half is None else (("half.csv", found.half),)
+        for name, frame in (("frontier.csv", found.table), ("levels.csv", found.levels), *half):
             text = frame.to_csv(index=False, lineterminator="\n")
             write_atomically(self.path / name, lambda file, text=text: file.write(text.encode()))
         self._write_record(found)
@@ -40,8 +43,12 @@ class FrontierStore:
 
     def abandon(self) -> None:
         """Give a folder back in which nothing was run, after an argument that `evaluate` refused."""
-        if not (self.path / "levels").exists():
+        if not self._begun:
             (self.path / RECORD).unlink(missing_ok=True)
+
+    @property
+    def _begun(self) -> bool:
+        return any((self.path / name).exists() for name in ("levels", GRID))
 
     def _write_record(self, found: Frontier | None) -> None:
         record = {

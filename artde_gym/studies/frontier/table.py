@@ -38,7 +38,9 @@ def _summary(varied: Axis, name: str, rows: list[dict[str, Any]], survival: floa
     """One row of the table, from the levels of one controller."""
     grid = varied.levels
     by_level = {grid.index(row["value"]): row for row in rows}
-    survived, failed = bracket({level: row["rate"] >= survival for level, row in by_level.items()})
+    outcomes = {level: row["rate"] >= survival for level, row in by_level.items()}
+    _, failed = bracket(outcomes)  # a grid may show survival again beyond it, which counts for nothing
+    survived, _ = bracket({level: ok for level, ok in outcomes.items() if failed is None or level < failed})
     larger = varied.harder == "larger"
     relation, value = "", np.nan
     if survived is not None and failed is not None and failed - survived == 1:

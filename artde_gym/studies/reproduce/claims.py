@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Callable, Mapping, Sequence
-from typing import Literal
+from collections.abc import Callable, Collection, Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -20,6 +21,8 @@ from artde_gym.evaluation.pairing import paired_across
 from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.statistics import Estimate
 from artde_gym.registry import Registry
+from artde_gym.studies.frontier.half import half_difference, survival_table
+from artde_gym.studies.frontier.result import Frontier
 
 CLAIM_COLUMNS = ["scenario", "claim", "verdict", "measured", "thesis"]
 Outcome = Literal["holds", "does not hold", "undecided", "not measured"]
@@ -43,13 +46,15 @@ class Claim:
         thesis: the publication's own number or observation; "ours" for a question that we add.
         judge: episodes -> verdict.
         ablation: whether it takes the ablation of `artde_gym.studies.reproduce.reproduction`.
+        curve: what a grid of `frontier` varies, that `judge` is given in place of episodes in the scenario.
     """
 
     scenario: str
     text: str
     thesis: str
-    judge: Callable[[Result], Verdict]
+    judge: Callable[[Any], Verdict]
     ablation: bool = False
+    curve: str | None = None
 
 
 def improves(
@@ -109,11 +114,25 @@ def repeats(scenario: str, other: str, metric: str, axes: Sequence[str], most: f
             return _nothing(result, scenario, ("artde",))
         difference = Estimate(-worst.value, -worst.high, -worst.low, worst.n)
         measured = f"largest difference: {axis} {_interval(difference)} %, {worst.n} pairs"
-        if all(-most <= estimate.low and estimate.high <= most for estimate in estimates.values()):
-            return Verdict("holds", measured)
-        if any(estimate.low > most or estimate.high < -most for estimate in estimates.values()):
-            return Verdict("does not hold", measured)
-        return Verdict("undecided", measured)
+        return Verdict(_within(estimates.values(), most), measured)
+
+    return judge
+
+
+def stays(scenario: str, other: str, metric: str, axes: Sequence[str], most: float) -> Callable[[Result], Verdict]:
+    """ARTDE's mean of the metric differs by at most `most` percent on every axis, in scenarios that share no draws."""
+
+    def judge(result: Result) -> Verdict:
+        for name in (scenario, other):
+            if missing := _missing(result, name, ("artde",)):
+                return missing
+        first, second = (_upright(result, name, "artde") for name in (scenario, other))
+        estimates = {axis: statistics.change(first[f"{metric}_{axis}"], second[f"{metric}_{axis}"]) for axis in axes}
+        axis, worst = max(estimates.items(), key=lambda item: np.nan_to_num(abs(item[1].value), nan=-1.0))
+        if worst.n == 0:
+            return _nothing(result, scenario, ("artde",))
+        measured = f"largest difference: {axis} {_interval(worst)} %, {len(first)} and {len(second)} episodes"
+        return Verdict(_within(estimates.values(), most), measured)
 
     return judge
 
@@ -160,6 +179,28 @@ def ordered(scenario: str, names: Sequence[str], metric: str) -> Callable[[Resul
     return judge
 
 
+def outlasts(names: Sequence[str]) -> Callable[[Frontier], Verdict]:
+    """Half of the episodes survive more for each controller than for the next, on the same seeds."""
+
+    def judge(found: Frontier) -> Verdict:
+        tables = {name: survival_table(found, name) for name in names}
+        if missing := [name for name, table in tables.items() if table is None]:
+            return Verdict("not measured", f"no whole grid of {', '.join(missing)}")
+        levels, sign = found.axis.levels, 1.0 if found.axis.harder == "larger" else -1.0
+        known = [table for table in tables.values() if table is not None]
+        gaps = [half_difference(first, second, levels) for first, second in itertools.pairwise(known)]
+        measured = ", ".join(
+            f"{first} beyond {second} by {_gap(gap)} {found.axis.unit}"
+            for (first, second), gap in zip(itertools.pairwise(names), gaps, strict=True)
+        )
+        if all(sign * gap.value > 0 and min(sign * gap.low, sign * gap.high) >= 0 for gap in gaps):
+            return Verdict("holds", measured)
+        reversed_ = any(sign * gap.value < 0 and max(sign * gap.low, sign * gap.high) <= 0 for gap in gaps)
+        return Verdict("does not hold" if reversed_ else "undecided", measured)
+
+    return judge
+
+
 CLAIMS: Registry[tuple[Claim, ...]] = Registry("claims", "artde_gym.claims")
 """Claims by robot: those of plug-ins, and those registered."""
 
@@ -183,11 +224,23 @@ def all_claims() -> tuple[Claim, ...]:
     return tuple(itertools.chain.from_iterable(CLAIMS.values()))
 
 
-def judge(result: Result, claims: Sequence[Claim] | None = None) -> pd.DataFrame:
-    """Judge some claims, or all; one row a claim: scenario, claim, verdict, measured, thesis."""
+def judge(
+    result: Result,
+    claims: Sequence[Claim] | None = None,
+    curves: Mapping[tuple[str, str], Frontier] = MappingProxyType({}),
+) -> pd.DataFrame:
+    """Judge some claims, or all; one row a claim: scenario, claim, verdict, measured, thesis.
+
+    `curves` are grids by scenario and what they vary.
+    """
     rows = []
     for claim in all_claims() if claims is None else claims:
-        verdict = claim.judge(result)
+        if claim.curve is None:
+            verdict = claim.judge(result)
+        elif found := curves.get((claim.scenario, claim.curve)):
+            verdict = claim.judge(found)
+        else:
+            verdict = Verdict("not measured", f"no grid of {claim.curve}")
         rows.append((claim.scenario, claim.text, verdict.outcome, verdict.measured, claim.thesis))
     return pd.DataFrame(rows, columns=CLAIM_COLUMNS)
 
@@ -211,6 +264,13 @@ def _upright(result: Result, scenario: str, controller: str) -> pd.DataFrame:
     return upright
 
 
+def _within(estimates: Collection[Estimate], most: float) -> Outcome:
+    """Whether all differences are at most so large (%)."""
+    if all(-most <= estimate.low and estimate.high <= most for estimate in estimates):
+        return "holds"
+    return "does not hold" if any(one.low > most or one.high < -most for one in estimates) else "undecided"
+
+
 def _missing(result: Result, scenario: str, controllers: tuple[str, ...]) -> Verdict | None:
     """The verdict where a controller has no episode."""
     missing = [name for name in controllers if result.rows(scenario, name).empty]
@@ -228,3 +288,7 @@ def _interval(estimate: Estimate) -> str:
         return "(no pair without a fall)"
     span = f" ({estimate.low:+.1f}..{estimate.high:+.1f})" if np.isfinite(estimate.low) else ""
     return f"{estimate.value:+.1f}{span}"
+
+
+def _gap(gap: Estimate) -> str:
+    return f"{gap.value:+.1f} ({gap.low:+g}..{gap.high:+g})"

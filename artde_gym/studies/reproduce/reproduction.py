@@ -2,10 +2,11 @@
 
 Beside the thesis' controllers and their rivals, an ablation can be run: plain TDE at constant extra stiffness and
 damping (`tde+kd`), as much of it as ARTDE's robust gain c came to *in the same scenario*, on average over its episodes.
-What ARTDE is better than that, it owes to adaptation.
+What ARTDE is better than that, it owes to adaptation. Claims on how much is survived take whole grids of `frontier`.
 
     <out>/                       the folder of `evaluate`, all controllers but the ablation
     <out>/ablation/<scenario>/   one of the ablation in each scenario, at a gain of its own
+    <out>/curves/<scenario>/     the grids
     <out>/claims.csv             the claims with their verdicts
 """
 
@@ -13,7 +14,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ import pandas as pd
 
 from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from artde_gym.evaluation.cells import Cell
+from artde_gym.evaluation.environments import fastest_engine
 from artde_gym.evaluation.evaluate import run_plan
 from artde_gym.evaluation.labels import named_controllers
 from artde_gym.evaluation.lock import writes_folder
@@ -30,19 +32,24 @@ from artde_gym.evaluation.store import write_atomically
 from artde_gym.evaluation.tasks import Update
 from artde_gym.kit import ROBOTS, RobotKit
 from artde_gym.scenarios import scenario as find_scenario
+from artde_gym.studies.frontier.result import Frontier
+from artde_gym.studies.frontier.search import frontier
 from artde_gym.studies.reproduce.claims import all_claims, judge
 
 ADAPTIVE, ABLATION = "artde", "tde+kd"
+EPISODES, SINGLE_EPISODES = 10, 4
+"""Where walks run one by one, fewer of them: all seeds alike are still more often than not."""
 RECORD_EPISODES = 3  # episodes of each cell that leave their signals: to look at; compressing all takes a minute or two
 GAIN = "robust_gain_mean"  # column of a law's mean c; with a suffix for each loop of a cascade, as its gains have
 
 
 @dataclasses.dataclass(frozen=True)
 class Reproduction:
-    """Episodes of all controllers, and the claims with their verdicts (see `claims.judge`)."""
+    """Episodes of all controllers, the claims with their verdicts, and the grids behind some of them."""
 
     result: Result
     claims: pd.DataFrame
+    curves: Mapping[tuple[str, str], Frontier] = dataclasses.field(default_factory=dict)
 
 
 def titles() -> list[str]:
@@ -80,7 +87,8 @@ def reproduce(
     scenarios: Sequence[str] | None = None,
     controllers: Sequence[str] | None = None,
     ablation: bool = False,
-    episodes: int = 10,
+    curves: bool = False,
+    episodes: int | None = None,
     seed: int = 0,
     workers: int = 1,
     engine: str | None = None,
@@ -95,10 +103,11 @@ def reproduce(
         scenarios: of this robot, in place of all that its kit names.
         controllers: likewise, without the ablation.
         ablation: whether to run it too; "artde" must be among the controllers then.
-        episodes: seeded episodes of each controller in each scenario.
+        curves: whether to run the grids of claims in these scenarios, too.
+        episodes: seeded episodes of each controller in each scenario; None for 10, or 4 where walks run singly.
         seed: of everything.
         workers: processes; the results do not depend on it.
-        engine: physics engine; None for the default one.
+        engine: physics engine, in its fastest vectorized; None for the fastest of all.
         allow_mixed: as for `evaluate`.
         on_progress: called with what runs ("episodes", "ablation in S1") and the progress of its episodes.
 
@@ -114,26 +123,64 @@ def reproduce(
         raise OptionError("controllers", ABLATION, "other names; it is run by ablation=True, at gains of its own")
     if ablation and ADAPTIVE not in names:
         raise OptionError("controllers", names, f"{ADAPTIVE!r} among them, from which the ablation takes its gain")
+    vectorized, engine = fastest_engine(find_scenario(chosen[0]).env_id, engine)
     plan = Plan.of(
         names,
         scenario=chosen,
-        episodes=episodes,
+        episodes=_episodes(vectorized) if episodes is None else episodes,
         seed=seed,
         workers=workers,
         env_kwargs={"engine": engine},
+        vectorized=vectorized,
         record_episodes=RECORD_EPISODES,
         allow_mixed=allow_mixed,
     )
+    plan = dataclasses.replace(plan, together=True)
     folder = Path(out)
     result = run_plan(plan, folder, on_progress and functools.partial(on_progress, "episodes"))
     for cell in plan.cells if ablation else ():
         if result.complete:
             result = _with_ablation(result, plan, cell, folder, on_progress)
-    made = [claim for claim in all_claims() if claim.scenario in result.scenarios and (ablation or not claim.ablation)]
-    verdicts = judge(result, made)
+    made = [
+        claim
+        for claim in all_claims()
+        if claim.scenario in result.scenarios and (ablation or not claim.ablation) and (curves or not claim.curve)
+    ]
+    found: dict[tuple[str, str], Frontier] = {}
+    for key in dict.fromkeys((claim.scenario, claim.curve) for claim in made if claim.curve):
+        if result.complete:
+            found[key] = _grid(plan, *key, folder, on_progress)
+            result = dataclasses.replace(result, complete=found[key].complete)
+    verdicts = judge(result, made, found)
     text = verdicts.to_csv(index=False, lineterminator="\n")
     write_atomically(folder / "claims.csv", lambda file: file.write(text.encode()))
-    return Reproduction(result, verdicts)
+    return Reproduction(result, verdicts, found)
+
+
+def _episodes(vectorized: bool) -> int:
+    return EPISODES if vectorized else SINGLE_EPISODES
+
+
+def _grid(
+    plan: Plan, scenario: str, path: str, folder: Path, on_progress: Callable[[str, Update], None] | None
+) -> Frontier:
+    """Run the standard grid of a scenario with the controllers of a plan."""
+    (cell,) = (cell for cell in plan.cells if cell.name == scenario)
+    return frontier(
+        list(plan.controllers),
+        cell.env_id,
+        path,
+        scenario=scenario,
+        grid=True,
+        episodes=plan.episodes,
+        seed=plan.seed,
+        workers=plan.workers,
+        out=folder / "curves" / scenario,
+        env_kwargs={"engine": cell.kwargs["engine"]},
+        vectorized=plan.vectorized,
+        allow_mixed=plan.allow_mixed,
+        on_progress=on_progress and (lambda value, update: on_progress(f"{path} {value:g} in {scenario}", update)),
+    )
 
 
 def _with_ablation(
