@@ -186,3 +186,24 @@ def _flatten(disturbances: dict[str, Any]) -> dict[str, Any]:
 
     visit("", disturbances)
     return columns
+
+
+def nested(columns: Mapping[str, Any]) -> dict[str, Any]:
+    """Columns such as "disturbance.push.0.start" as the nested mappings and lists that they came from."""
+    root: dict[str, Any] = {}
+    for column, value in columns.items():
+        if isinstance(value, float) and np.isnan(value):
+            continue  # of another scenario
+        *path, last = column.split(".")[1:]
+        place = root
+        for part in path:
+            place = place.setdefault(part, {})
+        place[last] = value
+    return _lists(root)
+
+
+def _lists(value: Any) -> Any:
+    if not isinstance(value, dict):
+        return value
+    inner = {key: _lists(item) for key, item in value.items()}
+    return list(inner.values()) if inner and all(key.isdigit() for key in inner) else inner

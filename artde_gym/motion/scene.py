@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import importlib
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -83,7 +82,7 @@ class Scene:
     """
 
     bodies: tuple[Body, ...]
-    sites: Mapping[str, Point] = MappingProxyType({})
+    sites: Mapping[str, Point] = dataclasses.field(default_factory=dict)
     contacts: tuple[Point, ...] = ()
     outlook: Outlook = OUTLOOK
     tint: Colour | None = None
