@@ -15,7 +15,7 @@ from artde_gym.evaluation.plan import Plan
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.evaluation.store import RECORD, read_episodes
-from artde_gym.evaluation.takes import Take, new_take, stored_take, text_of
+from artde_gym.evaluation.takes import Take, has_motion, new_take, stored_take, text_of
 from artde_gym.motion.replay import Replay
 from artde_gym.motion.scene import scene_of
 from artde_gym.palette import looks
@@ -123,11 +123,21 @@ def figure_of(cell: Cell, takes: Mapping[int, Sequence[Take]], ranks: Mapping[in
     }
 
 
-def ranked(rows: Rows, names: Sequence[str], metric: str) -> list[int]:
+def with_motion(numbers: Sequence[int], scenario: str, places: Mapping[str, Path]) -> list[int]:
+    """Return the episodes whose motion is stored of all controllers, each of which has its folder."""
+    return [
+        number
+        for number in numbers
+        if all(has_motion(folder, scenario, name, number) for name, folder in places.items())
+    ]
+
+
+def ranked(cell: Cell, rows: Rows, names: Sequence[str]) -> list[int]:
     """Order the episodes that all of the controllers have, the best first.
 
     Fewer falls are better, among equals those that come later, among equals the smaller mean error.
     """
+    metric = f"rmse_{tracking_of(cell.env_id).errors[0].unit}"
     numbers = dict.fromkeys(number for _, number in rows)
     complete = [number for number in numbers if all((name, number) in rows for name in names)]
 
@@ -188,23 +198,19 @@ class _Archive:
         """Find the takes of a scenario by episode, and how these rank."""
         cell, rows = self.cell(scenario), self._rows[scenario]
         names = _chosen(rows, controllers)
-        order = ranked(rows, names, f"rmse_{tracking_of(cell.env_id).errors[0].unit}")
+        order = ranked(cell, rows, names)
         if episode is not None and episode not in order:
             raise OptionError("episode", episode, f"one that all of {', '.join(names)} have: {sorted(order)}")
+        seen = with_motion(order, scenario, dict.fromkeys(names, self._folder))
+        ranks = worst_median_best(seen) if seen else dict.fromkeys(order[-1:], "worst")
+        if episode is not None:
+            ranks = {episode: ranks.get(episode, "")}
 
-        def stored(name: str, number: int) -> Take | None:
-            return stored_take(self._folder, scenario, name, rows[name, number])
+        def take(name: str, number: int) -> Take:
+            row = rows[name, number]
+            return stored_take(self._folder, scenario, name, row) or self._again(cell, name, row, on_progress)
 
-        if episode is None:
-            seen = [number for number in order if all(stored(name, number) for name in names)]
-            ranks = worst_median_best(seen) if seen else dict.fromkeys(order[-1:], "worst")
-        else:
-            ranks = {episode: ""}
-        found = {
-            number: [stored(name, number) or self._again(cell, name, rows[name, number], on_progress) for name in names]
-            for number in ranks
-        }
-        return found, ranks
+        return {number: [take(name, number) for name in names] for number in ranks}, ranks
 
     def _again(self, cell: Cell, name: str, row: Row, on_progress: Progress | None) -> Take:
         known = registered_controllers()

@@ -170,6 +170,19 @@ def read_traces(folder: Path, scenario: str, controller: str, episode: int) -> d
         return {name: stored[name] for name in stored.files}
 
 
+def stored_names(folder: Path, scenario: str, controller: str, episode: int) -> list[str]:
+    """Return the names of an episode's stored signals, without reading them.
+
+    Raises:
+        StoreError: if the file is damaged.
+    """
+    path = _traces_path(folder, scenario, controller, episode)
+    if not path.exists():
+        return []
+    with reading("signals", path, "a file that `evaluate` wrote", StoreError), path.open("rb") as file:
+        return list(np.load(file, allow_pickle=False).files)
+
+
 def _traces_path(folder: Path, scenario: Any, controller: Any, episode: Any) -> Path:
     return folder / "traces" / str(scenario) / f"{controller}-{episode}.npz"
 

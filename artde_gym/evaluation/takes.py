@@ -15,8 +15,8 @@ from artde_gym.evaluation.cells import Cell, single_of
 from artde_gym.evaluation.gains import policy_for
 from artde_gym.evaluation.metrics import NEVER
 from artde_gym.evaluation.rollout import Policy, nested, run_episode
-from artde_gym.evaluation.store import read_traces
-from artde_gym.motion.motion import Motion
+from artde_gym.evaluation.store import read_traces, stored_names
+from artde_gym.motion.motion import KEY, Motion
 from artde_gym.motion.packing import Packed
 from artde_gym.registration import ControllerSpec
 from artde_gym.tracking import Effort, Tracked, Tracking
@@ -24,6 +24,8 @@ from artde_gym.tracking import Effort, Tracked, Tracking
 POINTS = 400  # at most, of a plotted signal
 LEVELS = 2000  # of a plotted signal, from zero to its largest value
 INSIDE = "policy."
+SYMBOLS = {"n": "N", "nm": "Nm"}
+"""Unit as columns spell it -> as it is written, where they differ."""
 
 
 class Take(NamedTuple):
@@ -60,8 +62,14 @@ class Take(NamedTuple):
 
 def stored_take(folder: Path, scenario: str, name: str, row: Mapping[str, Any]) -> Take | None:
     """Read a take; None if its motion was not stored."""
-    traces = read_traces(folder, scenario, name, int(row["episode"]))
-    return None if traces is None or Motion.read(traces) is None else Take(name, row, traces)
+    if not has_motion(folder, scenario, name, int(row["episode"])):
+        return None
+    return Take(name, row, read_traces(folder, scenario, name, int(row["episode"])) or {})
+
+
+def has_motion(folder: Path, scenario: str, name: str, episode: int) -> bool:
+    """Tell whether the motion of an episode is stored."""
+    return f"{KEY}planes" in stored_names(folder, scenario, name, episode)
 
 
 def new_take(
@@ -140,10 +148,10 @@ def _signals(take: Take, tracking: Tracking) -> Iterable[tuple[str, Array]]:
     for place, tracked in enumerate(tracking.errors):
         yield f"error ({tracked.unit})", _error(fields, tracked, tracking.norm or place > 0)
     for effort in tracking.efforts:
-        yield f"{effort.name}, largest ({effort.unit})", _largest(fields, effort)
+        yield f"{effort.name}, largest ({SYMBOLS.get(effort.unit, effort.unit)})", _largest(fields, effort)
     for column, diagnostic in tracking.means.items():
         if INSIDE + diagnostic in fields:
-            yield column.removesuffix("_mean").replace("_", " "), _size(fields[INSIDE + diagnostic])
+            yield column.replace("_mean", "").replace("_", " "), _size(fields[INSIDE + diagnostic])
 
 
 def _error(fields: Mapping[str, Array], tracked: Tracked, norm: bool) -> Array:

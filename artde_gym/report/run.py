@@ -98,12 +98,16 @@ class Run:
         return None
 
     def _signals(self, scenario: str, controller: str, number: int) -> Signals | None:
-        part = self.ablation.get(scenario)
-        if part is not None and controller in part.result.controllers:
-            return part._signals(scenario, controller, number)
         rows = self.result.rows(scenario, controller)
-        traces = read_traces(self.folder, scenario, controller, number) if number in rows.index else None
+        if number not in rows.index:
+            return None
+        traces = read_traces(self.place(scenario, controller), scenario, controller, number)
         return None if traces is None else Signals(traces, rows.loc[number].to_dict())
+
+    def place(self, scenario: str, controller: str) -> Path:
+        """Return the folder that holds the signals of a controller in a scenario."""
+        part = self.ablation.get(scenario)
+        return self.folder if part is None or controller not in part.result.controllers else part.folder
 
 
 @dataclasses.dataclass(frozen=True)

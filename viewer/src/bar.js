@@ -49,7 +49,7 @@ export class Bar {
   told(time, length) {
     this.slider.value = time;
     this.slider.setAttribute("aria-valuetext", `${time.toFixed(2)} seconds of ${length.toFixed(1)}`);
-    this.clock.textContent = `${time.toFixed(2)} / ${length.toFixed(1)} s`;
+    this.clock.textContent = `${time.toFixed(2)} / ${length.toFixed(2)} s`;
   }
   /** Marks on the time line, and the same as a list of buttons. */
   show(runs, length) {

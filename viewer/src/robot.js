@@ -105,7 +105,7 @@ export class Robot extends Group {
 export class Arrow extends Group {
   constructor(color, thin = 1) {
     super();
-    const material = new MeshBasicMaterial({ color, transparent: true });
+    const material = new MeshBasicMaterial({ color, transparent: true, depthTest: false });  // in front: a part of the robot would hide it
     this.shaft = new Mesh(new CylinderGeometry(0.011 * thin, 0.011 * thin, 1, 14).translate(0, -0.5, 0), material);
     this.head = new Mesh(new ConeGeometry(0.032 * thin, 0.08 * thin, 20).translate(0, -0.04 * thin, 0), material);
     this.shaft.renderOrder = this.head.renderOrder = 3;

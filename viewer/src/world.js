@@ -104,6 +104,8 @@ export class World {
     }
     this.theme();
     gl.setClearColor(this.floor.material.uniforms.sky.value);
+    gl.setScissor(0, 0, width, height);
+    gl.clear();
     this.height = height;
   }
   /** Draw a rectangle of it with what is visible now; the light is aimed at `target`. */

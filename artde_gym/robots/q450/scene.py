@@ -17,5 +17,5 @@ def scene(kwargs: Mapping[str, Any]) -> Scene:
     """Return what is drawn of a flight with these arguments of the environment."""
     spec = q450()
     path = infinity_path(kwargs.get("duration", DURATION), PERIOD).position
-    outlook = Outlook(distance=3.2, yaw_deg=35.0, pitch_deg=24.0, height=0.6, reach=2.6, follows=False)
+    outlook = Outlook(distance=3.8, yaw_deg=35.0, pitch_deg=24.0, height=0.55, reach=2.6, follows=False)
     return Scene.of(spec, outlook=outlook, tint=spec.base.visuals[2].colour, path=path)
