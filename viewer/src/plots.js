@@ -45,13 +45,13 @@ class Plot {
     g.fillStyle = ink("--push"); g.globalAlpha = 0.16;
     for (const [begin, end] of spans) g.fillRect(x(begin), 0, Math.max(2, x(end) - x(begin)), height - BOTTOM);
     g.globalAlpha = 1;
-    for (const { run, period, values } of this.lines) {
+    for (const { run, period, values } of this.lines.toReversed()) {
       g.strokeStyle = lifted(run.color); g.lineWidth = 1.4; g.beginPath();
       values.forEach((v, i) => (i ? g.lineTo(x(i * period), y(v)) : g.moveTo(x(0), y(v))));
       g.stroke();
     }
     g.strokeStyle = ink("--ink"); g.lineWidth = 1; g.beginPath(); g.moveTo(x(time), 0); g.lineTo(x(time), height - BOTTOM); g.stroke();
-    for (const { run, period, values } of this.lines) {
+    for (const { run, period, values } of this.lines.toReversed()) {
       const v = values[Math.round(time / period)];
       if (v === undefined) continue;
       g.fillStyle = lifted(run.color); g.beginPath(); g.arc(x(time), y(Math.min(v, high)), 3, 0, 7); g.fill();

@@ -209,12 +209,12 @@ export class Replay {
     for (let i = 1; i < rows; i++) g.fillRect(0, Math.round(i * h * scale), this.canvas.width, 1);
   }
   #note(run, x, y, w, h) {
-    const on = run.arrow.shown && run.force > 0, p = on && run.arrow.tail.clone().setZ(run.arrow.tail.z + 0.05).project(this.world.camera);
+    const on = run.arrow.shown && run.force > 0, p = on && run.arrow.tail.clone().project(this.world.camera);
     const inside = on && Math.abs(p.x) < 1 && Math.abs(p.y) < 1;
     run.note.style.display = inside ? "block" : "none";
     if (!inside) return;
     run.note.style.left = `${Math.min(x + w - 28, Math.max(x + 28, x + ((p.x + 1) / 2) * w))}px`;
-    run.note.style.top = `${Math.max(y + 10, y + ((1 - p.y) / 2) * h)}px`;
+    run.note.style.top = `${Math.max(y + 10, y - 16 + ((1 - p.y) / 2) * h)}px`;
     run.note.textContent = `${run.force.toPrecision(3)} N`;
   }
 }
