@@ -29,7 +29,7 @@ QUIET = [
     "--disable-background-networking", "--disable-sync", "--disable-dev-shm-usage", "--hide-scrollbars",
     "--remote-debugging-port=0", "--remote-allow-origins=*",
 ]  # fmt: skip
-FLAT = ["--disable-gpu"]
+FLAT = ["--disable-gpu", "--disable-3d-apis"]  # as where there is no WebGL
 SOLID = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]  # WebGL without a graphics card
 SLOW = "GPU stall due to ReadPixels"  # of software's WebGL: no fault of the page
 

@@ -202,9 +202,11 @@ class _Archive:
         if episode is not None and episode not in order:
             raise OptionError("episode", episode, f"one that all of {', '.join(names)} have: {sorted(order)}")
         seen = with_motion(order, scenario, dict.fromkeys(names, self._folder))
-        ranks = worst_median_best(seen) if seen else dict.fromkeys(order[-1:], "worst")
+        ranks = worst_median_best(seen or order)
         if episode is not None:
             ranks = {episode: ranks.get(episode, "")}
+        elif not seen:
+            ranks = dict(list(ranks.items())[:1])  # to run all of them again would take long
 
         def take(name: str, number: int) -> Take:
             row = rows[name, number]

@@ -16,7 +16,7 @@ HZ = 60.0
 """Rate of stored motion, as far as the control period allows."""
 PLACE, TURN, JOINT, FORCE = 1e-4, 1 / 16384, 1e-4, 0.5  # units: m, 1, rad or m, N
 DEEPEST = -0.3  # m, below which a payload that has fallen through the ground is gone
-SHOWN = 2400  # samples at most in a page: 40 s at full rate, a minute at half of it
+SHOWN = 1800  # samples at most in a page: half a minute at full rate, a minute at half of it
 KEY = "motion."  # of its arrays in traces
 
 
