@@ -41,6 +41,9 @@ def replay(
     disturbances: Disturbances = None,
     env_kwargs: EnvKwargs = None,
     gains: Gains = None,
+    viewer: Annotated[
+        str | None, typer.Option(help="Address of a viewer that several files share. Default: one in the file.")
+    ] = None,
 ) -> None:
     """Write episodes of a folder, or of a new run, as one HTML file in which a browser shows them."""
     from artde_gym.evaluation.replay import replay as run_replay  # only when asked for
@@ -73,7 +76,7 @@ def replay(
             wanted = None if scenario is None else names(scenario)
             chosen = None if controllers is None else names(controllers)
             made = replay_folder(folder, wanted, chosen, episode, on_progress=told)
-    file = made.save(out)
+    file = made.save(out, viewer=viewer)
     for note in made.notes:
         console.print(f"Note: {note}", soft_wrap=True)
     console.print(f"Written to {file}", soft_wrap=True)

@@ -51,16 +51,17 @@ def viewer() -> str:
     )
 
 
-def page(title: str, figures: Iterable[Mapping[str, Any]]) -> str:
-    """Return a whole page of replays."""
+def page(title: str, figures: Iterable[Mapping[str, Any]], viewer_at: str | None = None) -> str:
+    """Return a whole page of replays; `viewer_at` is the address of a viewer that it shares, in place of its own."""
     body = "\n".join(f"<h2>{escape(str(data['title']))}</h2>\n{element(data)}" for data in figures)
+    alone = f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n' if viewer_at is None else ""
+    last = viewer() if viewer_at is None else f'<script src="{escape(viewer_at, quote=True)}"></script>'
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<meta name="color-scheme" content="light dark">\n<link rel="icon" href="data:,">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
-        f"<title>{escape(title)}</title>\n<style>\n{style()}</style>\n</head>\n"
-        f'<body class="replay-page">\n<main>\n{body}\n</main>\n{viewer()}\n</body>\n</html>\n'
+        f"{alone}<title>{escape(title)}</title>\n<style>\n{style()}</style>\n</head>\n"
+        f'<body class="replay-page">\n<main>\n{body}\n</main>\n{last}\n</body>\n</html>\n'
     )
 
 

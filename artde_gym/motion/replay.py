@@ -28,13 +28,23 @@ class Replay:
     @property
     def html(self) -> str:
         """The whole page: one file that needs no network."""
-        return page(f"artde-gym replay: {', '.join(str(data['title']) for data in self.figures)}", self.figures)
+        return page(self._title, self.figures)
 
-    def save(self, out: str | Path) -> Path:
-        """Write the page and return its path."""
+    @property
+    def _title(self) -> str:
+        return f"artde-gym replay: {', '.join(str(data['title']) for data in self.figures)}"
+
+    def save(self, out: str | Path, *, viewer: str | None = None) -> Path:
+        """Write the page and return its path.
+
+        Args:
+            out: the file.
+            viewer: address of a copy of `VIEWER` in `artde_gym.motion.page` that several pages share, as the page sees
+                it; None to put it into the page.
+        """
         out = Path(out)
         out.parent.mkdir(parents=True, exist_ok=True)
-        out.write_text(self.html, encoding="utf-8")
+        out.write_text(page(self._title, self.figures, viewer), encoding="utf-8")
         return out
 
     def _repr_html_(self) -> str:
