@@ -8,7 +8,7 @@ import { unpack } from "./unpack.js";
 import { Path, Vector3, World } from "./world.js";
 
 const PUSH = "#c4163c", LOAD = "#2f80c9", FADE = 0.3;  // s, in which an arrow goes when its push is over
-const NARROW = 620, METERS_PER_NEWTON = 0.012, ARROW = [0.2, 0.6], LOAD_LENGTH = 0.0035;  // pixels, m/N, m, m/N
+const NARROW = 620, METERS_PER_NEWTON = 0.012, ARROW = [0.25, 0.6], LOAD_LENGTH = 0.0035;  // pixels, m/N, m, m/N
 const SHAPE = 0.78;  // height of a panel over its width, at most
 
 export class Replay {

@@ -4,7 +4,7 @@ import {
 } from "three";
 
 const FACES = [[0, 1], [0, -1], [1, 1], [1, -1], [2, 1], [2, -1]];
-const UP = new Vector3(0, 1, 0), PAYLOAD = "#d9731a";
+const UP = new Vector3(0, 1, 0), PAYLOAD = "#f0e442";  // no controller has it
 
 /** Boxes [sx, sy, sz, cx, cy, cz, "#color"] as one geometry; `tint` replaces the color `from`. */
 function boxes(list, from, tint) {
