@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from artde_gym.arguments import reading, whole
-from artde_gym.errors import OptionError, StoreError, UnknownNameError, among
+from artde_gym.arguments import check_integer, wrap_read_errors
+from artde_gym.errors import OptionError, StoreError, UnknownNameError, suggest_names
 from artde_gym.evaluation.cells import Cell
-from artde_gym.evaluation.environments import arguments_of, robot_of, tracking_of, with_engine
+from artde_gym.evaluation.environments import arguments_of, metrics_spec_of, robot_of, with_engine
 from artde_gym.evaluation.plan import Plan
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.evaluation.seeds import episode_seed
@@ -18,7 +18,7 @@ from artde_gym.evaluation.store import RECORD, read_episodes
 from artde_gym.evaluation.takes import Take, has_motion, new_take, stored_take, text_of
 from artde_gym.motion.replay import Replay
 from artde_gym.motion.scene import scene_of
-from artde_gym.palette import looks
+from artde_gym.palette import styles
 from artde_gym.registration import registered_controllers
 from artde_gym.scenarios import SCENARIOS
 
@@ -56,7 +56,7 @@ def replay(
         UnknownNameError, OptionError, DisturbanceError, GainError: for a bad argument.
         RobotError: for a robot that says nothing of its looks.
     """
-    own_seed = episode_seed(whole("seed", seed, 0), whole("episode", episode, 0))
+    own_seed = episode_seed(check_integer("seed", seed, 0), check_integer("episode", episode, 0))
     plan = Plan.of(
         controllers, env_id, scenario=scenario, seed=seed, disturbances=disturbances, env_kwargs=env_kwargs, gains=gains
     )
@@ -104,14 +104,14 @@ def replay_folder(
 
 def figure_of(cell: Cell, takes: Mapping[int, Sequence[Take]], ranks: Mapping[int, str]) -> dict[str, Any]:
     """Return what the viewer shows of a cell: takes by number of the episode, and how each one ranks."""
-    tracking = tracking_of(cell.env_id)
+    tracking = metrics_spec_of(cell.env_id)
     entry = SCENARIOS.get(cell.name)
-    chosen = looks(dict.fromkeys(take.name for several in takes.values() for take in several))
+    chosen = styles(dict.fromkeys(take.name for several in takes.values() for take in several))
     episodes = [
         {
             "number": number,
             "rank": ranks.get(number, ""),
-            "runs": [text_of(take, tracking, chosen[take.name].colour) for take in several],
+            "runs": [text_of(take, tracking, chosen[take.name].color) for take in several],
         }
         for number, several in takes.items()
     ]
@@ -137,7 +137,7 @@ def ranked(cell: Cell, rows: Rows, names: Sequence[str]) -> list[int]:
 
     Fewer falls are better, among equals those that come later, among equals the smaller mean error.
     """
-    metric = f"rmse_{tracking_of(cell.env_id).errors[0].unit}"
+    metric = f"rmse_{metrics_spec_of(cell.env_id).errors[0].unit}"
     numbers = dict.fromkeys(number for _, number in rows)
     complete = [number for number in numbers if all((name, number) in rows for name in names)]
 
@@ -162,7 +162,7 @@ class _Archive:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        with reading("results folder", folder, "one that `evaluate` wrote", StoreError):
+        with wrap_read_errors("results folder", folder, "one that `evaluate` wrote", StoreError):
             self._configuration = json.loads((folder / RECORD).read_text(encoding="utf-8"))["configuration"]
             cells = self._configuration["cells"]
             self._cells = {cell["name"]: Cell(cell["name"], cell["env_id"], cell["kwargs"]) for cell in cells}
@@ -183,7 +183,7 @@ class _Archive:
             UnknownNameError: if it has no episode.
         """
         if scenario not in self.scenarios:
-            raise UnknownNameError("scenario", scenario, among(scenario, self.scenarios))
+            raise UnknownNameError("scenario", scenario, suggest_names(scenario, self.scenarios))
         cell = self._cells[scenario]
         known = arguments_of(cell.env_id)
         kwargs = {name: value for name, value in cell.kwargs.items() if name in known}  # a vector takes others, too
@@ -218,7 +218,7 @@ class _Archive:
         known = registered_controllers()
         if name not in known:
             allowed = "a registered name, to be run again: the folder has no motion of it"
-            raise UnknownNameError("controller", name, f"{allowed}; {among(name, known)}")
+            raise UnknownNameError("controller", name, f"{allowed}; {suggest_names(name, known)}")
         gains = self._configuration.get("gains", {}).get(name, {})
         return new_take(cell, name, known[name], gains, int(row["seed"]), row, _told(on_progress, name))
 
@@ -231,7 +231,7 @@ def _chosen(rows: Rows, controllers: Sequence[str] | None) -> list[str]:
         raise OptionError("controllers", list(controllers), f"1 to {TOGETHER} names")
     for name in controllers:
         if name not in known:
-            raise UnknownNameError("controller", name, among(name, known))
+            raise UnknownNameError("controller", name, suggest_names(name, known))
     return list(dict.fromkeys(controllers))
 
 

@@ -16,10 +16,10 @@ from artde_gym.evaluation.gains import policy_for
 from artde_gym.evaluation.metrics import NEVER
 from artde_gym.evaluation.rollout import Policy, nested, run_episode
 from artde_gym.evaluation.store import read_traces, stored_names
+from artde_gym.metrics_spec import EffortSignal, MetricsSpec, TrackedSignal
 from artde_gym.motion.motion import KEY, Motion
 from artde_gym.motion.packing import Packed
 from artde_gym.registration import ControllerSpec
-from artde_gym.tracking import Effort, Tracked, Tracking
 
 POINTS = 400  # at most, of a plotted signal
 LEVELS = 2000  # of a plotted signal, from zero to its largest value
@@ -106,7 +106,7 @@ def _end(row: Mapping[str, Any]) -> str:
     return f"{'fell' if row['fell'] else 'ended'} at {row['duration_s']:.3f} s"
 
 
-def text_of(take: Take, tracking: Tracking, color: str) -> dict[str, Any]:
+def text_of(take: Take, tracking: MetricsSpec, color: str) -> dict[str, Any]:
     """Return what a page holds of a take."""
     row, motion = take.row, take.motion.thinned()
     return {
@@ -134,34 +134,34 @@ def _pushes(take: Take) -> Iterable[dict[str, Any]]:
 
 def _payload_events(take: Take) -> Iterable[tuple[float, str]]:
     payload = take.disturbances.get("payload")
-    if payload and payload["attach"] < payload["drop"]:
+    if payload and payload["attach_time"] < payload["detach_time"]:
         what = f"payload of {payload['mass']:.3g} kg"
-        if payload["attach"] > 0:
-            yield payload["attach"], f"{what} attached"
-        if payload["drop"] < NEVER:
-            yield payload["drop"], f"{what} dropped"
+        if payload["attach_time"] > 0:
+            yield payload["attach_time"], f"{what} attached"
+        if payload["detach_time"] < NEVER:
+            yield payload["detach_time"], f"{what} dropped"
 
 
-def _signals(take: Take, tracking: Tracking) -> Iterable[tuple[str, Array]]:
+def _signals(take: Take, tracking: MetricsSpec) -> Iterable[tuple[str, Array]]:
     """Sizes over time: each tracked error, each effort, and gains of the policy that are reported as means."""
     fields = take.traces
     for place, tracked in enumerate(tracking.errors):
         yield f"error ({tracked.unit})", _error(fields, tracked, tracking.norm or place > 0)
     for effort in tracking.efforts:
         yield f"{effort.name}, largest ({SYMBOLS.get(effort.unit, effort.unit)})", _largest(fields, effort)
-    for column, diagnostic in tracking.means.items():
+    for column, diagnostic in tracking.diagnostic_means.items():
         if INSIDE + diagnostic in fields:
             yield column.replace("_mean", "").replace("_", " "), _size(fields[INSIDE + diagnostic])
 
 
-def _error(fields: Mapping[str, Array], tracked: Tracked, norm: bool) -> Array:
+def _error(fields: Mapping[str, Array], tracked: TrackedSignal, norm: bool) -> Array:
     own = INSIDE + (tracked.diagnostic or "")
     error = tracked.scale * (fields[own] if own in fields else tracked.error(fields))
     squares = (error.astype(np.float64) ** 2).reshape(len(error), -1)
     return np.sqrt(squares.sum(axis=1) if norm else squares.mean(axis=1))
 
 
-def _largest(fields: Mapping[str, Array], effort: Effort) -> Array:
+def _largest(fields: Mapping[str, Array], effort: EffortSignal) -> Array:
     return np.abs(fields[effort.field][:, effort.part]).max(axis=1)
 
 

@@ -114,7 +114,7 @@ class Scene:
     def text(self) -> dict[str, Any]:
         """Return what a page holds."""
         bodies = [
-            {**body._asdict(), "boxes": [[*_short((*box.size, *box.center)), _hex(box.colour)] for box in body.boxes]}
+            {**body._asdict(), "boxes": [[*_short((*box.size, *box.center)), _hex(box.color)] for box in body.boxes]}
             for body in self.bodies
         ]
         path = None if self.path is None else _short(self.path[:: -(-len(self.path) // POINTS)].ravel())

@@ -109,7 +109,7 @@ def test_traces_hold_what_the_engine_says(tmp_path, engine_name, scenario, contr
     seen: list[Any] = []
     while True:
         if round(info["time_s"] / control_period) % stride == 0:
-            seen.append((engine.read(), engine.payload_position(), engine.foot_loads()))
+            seen.append((engine.state(), engine.payload_position(), engine.foot_loads()))
         if over:
             break
         action, state = policy.predict(observation, state)
@@ -183,7 +183,7 @@ def test_an_old_folder_is_run_again_and_what_does_not_repeat_is_said(flights, tm
 
 def test_a_batch_is_run_again_one_by_one(tmp_path):
     arguments = {"env_kwargs": {"duration": 0.3}, "disturbances": {}}
-    evaluate(["tde"], QUADROTOR, episodes=2, out=tmp_path, backend="batch", **arguments)
+    evaluate(["tde"], QUADROTOR, episodes=2, out=tmp_path, vectorized=True, **arguments)
     shown = replay_folder(tmp_path)
     assert len(shown.figures[0]["episodes"]) == 1
 
@@ -211,7 +211,7 @@ def test_the_command_of_a_folder_and_of_a_new_run(flights, tmp_path):
 def test_pushes_drops_and_falls_are_events(tmp_path):
     push = {"body": "body", "magnitude": 3.0, "direction": [0.0, 2.0, 0.0], "start": 0.2, "duration": 0.1}
     late = {**push, "start": 5.0}
-    disturbances = {"push": [push, late], "payload": {"mass": 0.35, "drop": 0.4}}
+    disturbances = {"push": [push, late], "payload": {"mass": 0.35, "detach_time": 0.4}}
     shown = artde_gym.replay(["tde"], QUADROTOR, env_kwargs=SHORT, disturbances=disturbances)
     (run,) = shown.figures[0]["episodes"][0]["runs"]
     assert run["pushes"] == [{"site": "body", "force": [0.0, 3.0, 0.0], "start": 0.2, "end": pytest.approx(0.3)}]

@@ -25,7 +25,7 @@ def scene(kwargs: Mapping[str, Any]) -> Scene:
     return Scene.of(
         spec,
         outlook=Outlook(distance=1.9, yaw_deg=55.0, pitch_deg=12.0, height=0.42, reach=1.2),
-        tint=spec.base.visuals[0].colour,
+        tint=spec.base.visuals[0].color,
         path=path,
         footholds=_footholds(pattern.feet[::STRIDE]),
         sole=FOOT_SIZE[:2],

@@ -18,4 +18,4 @@ def scene(kwargs: Mapping[str, Any]) -> Scene:
     spec = q450()
     path = infinity_path(kwargs.get("duration", DURATION), PERIOD).position
     outlook = Outlook(distance=3.8, yaw_deg=35.0, pitch_deg=24.0, height=0.55, reach=2.6, follows=False)
-    return Scene.of(spec, outlook=outlook, tint=spec.base.visuals[2].colour, path=path)
+    return Scene.of(spec, outlook=outlook, tint=spec.base.visuals[2].color, path=path)

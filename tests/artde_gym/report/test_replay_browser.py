@@ -23,12 +23,12 @@ pytestmark = pytest.mark.browser
 
 PUSH = {"body": "chest", "magnitude": 20.0, "direction": [1.0, 0.0, 0.0], "start": 0.3, "duration": 0.1}
 WALK = {
-    "disturbances": {"payload": {"mass": 1.3, "drop": 0.6}, "push": [PUSH]},
+    "disturbances": {"payload": {"mass": 1.3, "detach_time": 0.6}, "push": [PUSH]},
     "actuator_inertia": "lumped",
     "control_period": 0.004,
     "duration": 1.2,
 }
-FLIGHT = {"disturbances": {"payload": {"mass": 0.35, "drop": 0.6}}, "duration": 1.2}
+FLIGHT = {"disturbances": {"payload": {"mass": 0.35, "detach_time": 0.6}}, "duration": 1.2}
 CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "walk": ("BipedWalk-Payload-v0", WALK),
     "push": ("BipedPush-v0", {**WALK, "arms": "revolute"}),

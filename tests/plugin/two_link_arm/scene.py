@@ -16,4 +16,4 @@ def scene(kwargs):
     forearm = Body("forearm", ROD, parent=1, origin=(0.0, 0.0, -LENGTH), axis=BACK, joint=1)
     sites = {"tip": Point(2, (0.0, 0.0, -LENGTH))}
     outlook = Outlook(distance=2.6, yaw_deg=20.0, height=0.7, follows=False)
-    return Scene((block, upper, forearm), sites, outlook=outlook, tint=ROD[0].colour, payload_radius=0.06)
+    return Scene((block, upper, forearm), sites, outlook=outlook, tint=ROD[0].color, payload_radius=0.06)
