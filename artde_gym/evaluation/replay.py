@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from artde_gym.arguments import check_integer, wrap_read_errors
+from artde_gym.deprecation import current_configuration
 from artde_gym.errors import OptionError, StoreError, UnknownNameError, suggest_names
 from artde_gym.evaluation.cells import Cell
 from artde_gym.evaluation.environments import arguments_of, metrics_spec_of, robot_of, with_engine
@@ -163,7 +164,8 @@ class _Archive:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         with wrap_read_errors("results folder", folder, "one that `evaluate` wrote", StoreError):
-            self._configuration = json.loads((folder / RECORD).read_text(encoding="utf-8"))["configuration"]
+            record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+            self._configuration = current_configuration(record["configuration"])
             cells = self._configuration["cells"]
             self._cells = {cell["name"]: Cell(cell["name"], cell["env_id"], cell["kwargs"]) for cell in cells}
         _, table = read_episodes(folder)

@@ -134,7 +134,7 @@ export class Replay {
     run.center.set(value(0), value(1), value(2));
     if (!robot) return;
     robot.pose(Array.from({ length: 7 }, (_, c) => value(c)), q, columns[Math.round(at) * size + ball + 3] > 0.5 ? [value(ball), value(ball + 1), value(ball + 2)] : null);
-    robot.grey(run.over && Boolean(run.fall));
+    robot.gray(run.over && Boolean(run.fall));
     run.trail.show(Math.floor(at / 2) + 1);
     run.tag.lastChild.textContent = run.over && run.fall ? `fell at ${run.end.toFixed(2)} s` : "";
     this.#pushed(run);

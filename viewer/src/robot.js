@@ -68,9 +68,9 @@ export class Robot extends Group {
     }
   }
   /** Take the colors away, or give them back. */
-  grey(on) {
-    if (on === Boolean(this.greyed)) return;
-    this.greyed = on;
+  gray(on) {
+    if (on === Boolean(this.grayed)) return;
+    this.grayed = on;
     for (const { mesh } of this.bodies) {
       if (!mesh) continue;
       const color = mesh.geometry.attributes.color, own = (mesh.own ??= color.array.slice());

@@ -198,14 +198,14 @@ def test_a_fall_is_frozen_and_gray(solid_browser, tmp_path):
     page = artde_gym.replay({"tde": "tde", "rest": Rest()}, "QuadInfinity-Payload-v0", env_kwargs={"duration": 1.5})
     shown(solid_browser, page.save(tmp_path / "x.html"))
     solid_browser.run(f"{REPLAY}.seek(1.4)")
-    assert solid_browser.run(f"{REPLAY}.runs.map((one) => Boolean(one.robot.greyed))") == [False, True]
+    assert solid_browser.run(f"{REPLAY}.runs.map((one) => Boolean(one.robot.grayed))") == [False, True]
     assert "fell at" in solid_browser.run(f"{REPLAY}.runs[1].tag.textContent")
     still = f"{REPLAY}.runs[1].robot.bodies[0].position.toArray()"
     before = solid_browser.run(still)
     solid_browser.run(f"{REPLAY}.seek(1.5)")
     assert solid_browser.run(still) == before
     solid_browser.run(f"{REPLAY}.seek(0)")
-    assert solid_browser.run(f"{REPLAY}.runs.map((one) => Boolean(one.robot.greyed))") == [False, False]
+    assert solid_browser.run(f"{REPLAY}.runs.map((one) => Boolean(one.robot.grayed))") == [False, False]
 
 
 def test_a_report_shows_the_worst_the_median_and_the_best(solid_browser, report):
