@@ -14,7 +14,7 @@ CUDA := ^(cuda|nvidia)-|^triton=
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help evaluate test tests clients coverage lowest check format benchmark soak docs gallery constraints dist clean
+.PHONY: help evaluate test tests clients coverage lowest check format benchmark soak docs gallery viewer constraints dist clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*  ## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -60,6 +60,9 @@ docs: $(VENV)/docs  ## build the documentation into site/, warnings are errors (
 
 gallery: $(VENV)/dev  ## remake the pictures of the README and of the documentation (needs chromium; some minutes)
 	OMP_NUM_THREADS=1 $(BIN)/python scripts/gallery.py
+
+viewer:  ## bundle the viewer of replays anew (needs node and npm; its sources are in viewer/src)
+	cd viewer && npm ci --ignore-scripts --no-audit --no-fund && npm run --silent build
 
 constraints: $(VENV)/core  ## pin what is not pinned yet, for every Python (everything anew: rm constraints.txt first)
 	@$(PIP) uv

@@ -142,6 +142,8 @@ class RobotKit:
         push: of live play; None to push at the first site with 10 N.
         report: module with `reference(kwargs)` and `figures(episode)`, see `artde_gym.report.robot`; None for the
             figures that all robots have.
+        scene: "module:function" that is called with an environment's arguments and returns the
+            `artde_gym.motion.scene.Scene` that replays show; None to make one of a model that is a `RobotSpec`.
     """
 
     name: str
@@ -158,6 +160,7 @@ class RobotKit:
     motion: Motion = MOTION
     push: Push | None = None
     report: str | None = None
+    scene: str | None = None
 
     @property
     def sites(self) -> tuple[str, ...]:

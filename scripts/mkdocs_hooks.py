@@ -10,7 +10,10 @@ from documentation.figures import FIGURES
 from documentation.mathematics import font, mathml, symbols
 from documentation.notebooks import NOTEBOOKS, notebook
 from documentation.pages import ROOT, cards, generated
+from documentation.replays import frame
 from mkdocs.structure.files import File
+
+from artde_gym.motion.page import VIEWER
 
 CHART_STYLE = ROOT / "artde_gym/report/assets/chart.css"
 
@@ -29,17 +32,19 @@ def on_files(files: Any, config: Any) -> None:
         **generated(),
         **{f"{page.removesuffix('.md')}.ipynb": notebook(Path(config.docs_dir) / page) for page in NOTEBOOKS},
         "assets/chart.css": CHART_STYLE.read_text(encoding="utf-8"),
+        "assets/replay.js": VIEWER.read_text(encoding="utf-8"),
     }
     for path, content in contents.items():
         files.append(File.generated(config, path, content=content))
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Put in what a page asks for, `<!-- figure: NAME -->` or `<!-- source: PATH -->`, and the link to its notebook."""
+    """Put in the figures, replays and sources that a page asks for, and the link to its notebook."""
     if page.file.src_uri in NOTEBOOKS:
         title, rest = markdown.split("\n", 1)
         markdown = f"{title}\n\n[This page as a notebook]({Path(page.file.src_uri).stem}.ipynb)\n{rest}"
     markdown = re.sub(r"<!-- figure: (\S+) -->", lambda found: FIGURES[found[1]](), markdown)
+    markdown = re.sub(r"<!-- replay: (\S+) -->", lambda found: frame(found[1], page.file.src_uri), markdown)
     return re.sub(r"<!-- source: (\S+) -->", lambda found: _source(found[1]), markdown)
 
 

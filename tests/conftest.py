@@ -25,10 +25,13 @@ settings.load_profile("reproducible")
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 STARTED = 30.0  # s, at most until the browser listens
 QUIET = [
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-component-update",
+    "--headless", "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-component-update",
     "--disable-background-networking", "--disable-sync", "--disable-dev-shm-usage", "--hide-scrollbars",
     "--remote-debugging-port=0", "--remote-allow-origins=*",
 ]  # fmt: skip
+FLAT = ["--disable-gpu", "--disable-3d-apis"]  # as where there is no WebGL
+SOLID = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]  # WebGL without a graphics card
+SLOW = "GPU stall due to ReadPixels"  # of software's WebGL: no fault of the page
 
 
 def program() -> str | None:
@@ -38,12 +41,12 @@ def program() -> str | None:
 class Chromium:
     """One page in a browser of its own; what it logs as an error, or fails to load, is in `errors`."""
 
-    def __init__(self) -> None:
+    def __init__(self, *flags: str) -> None:
         found = program()
         assert found
         self._folder = tempfile.mkdtemp(prefix="chromium-")
         self._process = subprocess.Popen(
-            [found, *QUIET, f"--user-data-dir={self._folder}", "about:blank"],
+            [found, *QUIET, *flags, f"--user-data-dir={self._folder}", "about:blank"],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
@@ -92,7 +95,8 @@ class Chromium:
         elif method == "Runtime.consoleAPICalled" and params["type"] in ("error", "warning", "assert"):
             self.errors.append(str(params["args"]))
         elif method == "Log.entryAdded" and params["entry"]["level"] in ("error", "warning"):
-            self.errors.append(params["entry"]["text"])
+            if SLOW not in params["entry"]["text"]:
+                self.errors.append(params["entry"]["text"])
         elif method == "Network.loadingFailed":
             self.errors.append(params["errorText"])
         elif method == "Network.requestWillBeSent" and not params["request"]["url"].startswith(("file:", "data:")):
@@ -121,5 +125,14 @@ class Chromium:
 def browser():
     if not program():
         pytest.skip("no Chromium here; on Debian: apt-get install chromium")
-    with Chromium() as page:
+    with Chromium(*FLAT) as page:
+        yield page
+
+
+@pytest.fixture(scope="session")
+def solid_browser():
+    """A browser that draws in three dimensions, by software."""
+    if not program():
+        pytest.skip("no Chromium here; on Debian: apt-get install chromium")
+    with Chromium(*SOLID) as page:
         yield page

@@ -17,6 +17,7 @@ from artde_gym.cli import (
     frontier,
     listing,
     play,
+    replay,
     report,
     reproduce,
     sweep,
@@ -40,6 +41,7 @@ app.command()(sweep.sweep)
 app.command()(reproduce.reproduce)
 app.command()(train.train)
 app.command()(report.report)
+app.command()(replay.replay)
 app.command()(video.video)
 app.command()(play.play)
 app.command("list")(listing.list_everything)

@@ -13,6 +13,7 @@ from artde_gym.envs.closed_env import CLOSED, require_open
 from artde_gym.envs.step_limit import StepLimitMixin
 from artde_gym.errors import RobotError
 from artde_gym.info import EpisodeInfo
+from artde_gym.motion.motion import Pose
 from artde_gym.multibody.spec import RobotSpec, Vector
 from artde_gym.sim.engine import Engine
 
@@ -38,6 +39,12 @@ class InteractiveMixin(StepLimitMixin, abc.ABC):
     @abc.abstractmethod
     def schedule(self) -> Schedule:
         """What happens in this episode, and when."""
+
+    def pose(self) -> Pose:
+        """Read where robot and payload are, as they are and not as sensors see them."""
+        state = self._engine.state()
+        payload, loads = self._engine.payload_position(), self._engine.foot_loads()
+        return Pose(state.position, state.quat_xyzw, state.q, payload, loads)
 
     def push(self, site: str, force: Vector, duration: float = 0.2) -> None:
         """Push at a site of the robot (N, world axes) from now on, for a while (s).

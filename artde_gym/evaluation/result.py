@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,7 +14,9 @@ from artde_gym.arrays import Array
 from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from artde_gym.evaluation import statistics
 from artde_gym.evaluation.pairing import DRAWN, episode_key, paired
+from artde_gym.evaluation.replay import replay_folder
 from artde_gym.evaluation.wide_table import WideTable
+from artde_gym.motion.replay import Replay
 
 _NOT_METRICS = ("seed", "episode", "fell", "duration_s")
 _OF_ALL = ("fell", "reward")
@@ -68,6 +71,21 @@ class Result:
     @property
     def scenarios(self) -> list[str]:
         return self._different("scenario")
+
+    def replay(
+        self,
+        scenario: str | Sequence[str] | None = None,
+        controllers: Sequence[str] | None = None,
+        episode: int | None = None,
+    ) -> Replay:
+        """Show its episodes in a browser, or in a notebook; arguments and errors as for `replay_folder`.
+
+        Raises:
+            OptionError: if they are not stored in a folder.
+        """
+        if self.folder is None:
+            raise OptionError("folder", None, "a result that is stored, evaluate(..., out=...); or `artde_gym.replay`")
+        return replay_folder(self.folder, scenario, controllers, episode)
 
     def _different(self, column: str) -> list[str]:
         """Values of a column in the order in which they come; an empty result has no columns."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from artde_gym.evaluation.metrics import Metrics, Span, events_of, payload_of
 from artde_gym.info import fall_reason
+from artde_gym.motion.motion import HZ, Motion, Pose
 
 Array = NDArray[Any]
 
@@ -25,7 +26,10 @@ class Policy(Protocol):
 
 
 class Episode(NamedTuple):
-    """Metrics as one row, and signals over time: "time" (samples,) and (samples, size) each by name."""
+    """Metrics as one row, and signals over time: "time" (samples,) and (samples, size) each by name.
+
+    The motion is among them as `artde_gym.motion.motion.Motion.read` takes it.
+    """
 
     row: dict[str, Any]
     traces: dict[str, Array]
@@ -61,6 +65,8 @@ def run_episode(
     observation, info = env.reset(seed=seed, options=options)
     disturbances = plant.sampled_disturbances
     observations, diagnostics, told = [np.array(observation)], [], [_told(plant, info)]  # copies: policies write
+    poses = _Poses(plant)
+    poses.look(0)
     state, episode_start = None, True
     terminated = truncated = False
     total = 0.0
@@ -75,6 +81,7 @@ def run_episode(
         observations.append(np.array(observation))
         if count % stride == 0:
             told.append(_told(plant, info))
+        poses.look(count)
         if on_progress is not None and count % report_every == 0:
             on_progress(info["time_s"])
 
@@ -88,7 +95,25 @@ def run_episode(
     row = row_of(reason, info["time_s"], total, metrics.rows(np.array([bool(terminated)]))[0], disturbances)
     kept = slice(None, None, stride // looks)
     seen = _part(fields, slice(None, None, stride)) | stack(told)
-    return Episode(row, traces_of(stride * period, seen, _part(inside, kept)))
+    return Episode(row, traces_of(stride * period, seen, _part(inside, kept)) | poses.traces())
+
+
+class _Poses:
+    """Poses of an episode, of an environment that tells them, at the rate of stored motion."""
+
+    def __init__(self, plant: Any) -> None:
+        self._pose: Callable[[], Pose] | None = getattr(plant, "pose", None)
+        self._stride = max(1, round(1.0 / (HZ * plant.control_period)))
+        self._period = self._stride * plant.control_period
+        self._poses: list[Pose] = []
+
+    def look(self, step: int) -> None:
+        """Keep the pose after so many steps."""
+        if self._pose is not None and step % self._stride == 0:
+            self._poses.append(self._pose())
+
+    def traces(self) -> dict[str, Array]:
+        return Motion.of(self._poses, self._period).traces() if self._poses else {}
 
 
 def diagnosed_every(plant: Any, stride: int) -> int:
@@ -161,3 +186,24 @@ def _flatten(disturbances: dict[str, Any]) -> dict[str, Any]:
 
     visit("", disturbances)
     return columns
+
+
+def nested(columns: Mapping[str, Any]) -> dict[str, Any]:
+    """Columns such as "disturbance.push.0.start" as the nested mappings and lists that they came from."""
+    root: dict[str, Any] = {}
+    for column, value in columns.items():
+        if isinstance(value, float) and np.isnan(value):
+            continue  # of another scenario
+        *path, last = column.split(".")[1:]
+        place = root
+        for part in path:
+            place = place.setdefault(part, {})
+        place[last] = value
+    return _lists(root)
+
+
+def _lists(value: Any) -> Any:
+    if not isinstance(value, dict):
+        return value
+    inner = {key: _lists(item) for key, item in value.items()}
+    return list(inner.values()) if inner and all(key.isdigit() for key in inner) else inner

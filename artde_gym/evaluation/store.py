@@ -80,9 +80,8 @@ class Store:
             self._rewrite()
 
     def save_traces(self, row: Mapping[str, Any], traces: Mapping[str, NDArray[Any]]) -> None:
-        folder = self.folder / "traces" / str(row["scenario"])
-        folder.mkdir(parents=True, exist_ok=True)
-        path = folder / f"{row['controller']}-{row['episode']}.npz"
+        path = _traces_path(self.folder, row["scenario"], row["controller"], row["episode"])
+        path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, lambda file: np.savez_compressed(file, **traces))  # pyright: ignore[reportArgumentType]
 
     def finish(self, rows: list[dict[str, Any]], summary: pd.DataFrame) -> None:
@@ -156,6 +155,37 @@ def read_episodes(folder: Path) -> tuple[str, pd.DataFrame]:
         if (frame["seed"].to_numpy() < 0).any():
             raise ValueError("a seed below zero")
     return whole, with_exact_seeds(frame)
+
+
+def read_traces(folder: Path, scenario: str, controller: str, episode: int) -> dict[str, NDArray[Any]] | None:
+    """Return the signals of an episode by name; None if none were stored.
+
+    Raises:
+        StoreError: if they cannot be read.
+    """
+    path = _traces_path(folder, scenario, controller, episode)
+    if not path.exists():
+        return None
+    with wrap_read_errors("signals", path, "a file that `evaluate` wrote", StoreError):
+        stored = np.load(io.BytesIO(path.read_bytes()), allow_pickle=False)  # a damaged file it would leave open
+        return {name: stored[name] for name in stored.files}
+
+
+def stored_names(folder: Path, scenario: str, controller: str, episode: int) -> list[str]:
+    """Return the names of an episode's stored signals, without reading them.
+
+    Raises:
+        StoreError: if the file is damaged.
+    """
+    path = _traces_path(folder, scenario, controller, episode)
+    if not path.exists():
+        return []
+    with wrap_read_errors("signals", path, "a file that `evaluate` wrote", StoreError), path.open("rb") as file:
+        return list(np.load(file, allow_pickle=False).files)
+
+
+def _traces_path(folder: Path, scenario: Any, controller: Any, episode: Any) -> Path:
+    return folder / "traces" / str(scenario) / f"{controller}-{episode}.npz"
 
 
 def parse_table(text: str, words: Collection[str]) -> pd.DataFrame:

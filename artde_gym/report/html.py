@@ -8,10 +8,12 @@ from html import escape
 from pathlib import Path
 from typing import NamedTuple
 
+from artde_gym.motion import page as replays
 from artde_gym.palette import Style
 from artde_gym.report.chart import SHAPES
 
 ASSETS = Path(__file__).parent / "assets"
+REPLAY = '<div class="replay"'
 
 
 class Cell(NamedTuple):
@@ -23,14 +25,16 @@ class Cell(NamedTuple):
 
 
 def page(title: str, body: Iterable[str]) -> str:
-    """The whole file."""
+    """The whole file; with the viewer of replays, if it has any."""
+    text = "\n".join(body)
+    replayed = REPLAY in text
+    look = (replays.style() if replayed else "") + _asset("chart.css") + _asset("style.css")
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<meta name="color-scheme" content="light dark">\n<link rel="icon" href="data:,">\n'
-        f"<title>{escape(title)}</title>\n<style>\n{_asset('chart.css')}{_asset('style.css')}</style>\n</head>\n<body>\n<main>\n"
-        + "\n".join(body)
-        + f"\n</main>\n<script>\n{_asset('sort.js')}</script>\n</body>\n</html>\n"
+        f"<title>{escape(title)}</title>\n<style>\n{look}</style>\n</head>\n<body>\n<main>\n{text}\n</main>\n"
+        f"<script>\n{_asset('sort.js')}</script>\n{replays.viewer() if replayed else ''}\n</body>\n</html>\n"
     )
 
 

@@ -19,6 +19,7 @@ from artde_gym.report.answer import headline, sentences
 from artde_gym.report.html import bullets, page, paragraph, section
 from artde_gym.report.laws import Laws, unavailable
 from artde_gym.report.pictures import Progress, SnapshotSet
+from artde_gym.report.replays import replay_of
 from artde_gym.report.robot import figures_of
 from artde_gym.report.run import Episode, Run
 from artde_gym.scenarios import SCENARIOS
@@ -100,6 +101,7 @@ def _scenario(run: Run, laws: Laws, album: SnapshotSet, scenario: str, said: lis
     parts += [bullets(said) if said else "", tables.falls(run, scenario)]
     if run.result.episodes.loc[run.result.episodes["scenario"] == scenario, "fell"].any():
         parts.append(tables.survival(run, scenario))
+    parts += replay_of(run, scenario)
     parts += album.figures(scenario)
     parts += tables.metrics(run, scenario)
     parts.append(tables.events(run, scenario))

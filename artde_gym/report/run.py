@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import io
 import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from artde_gym.arguments import wrap_read_errors
@@ -19,7 +17,8 @@ from artde_gym.errors import StoreError
 from artde_gym.evaluation.environments import metrics_spec_of
 from artde_gym.evaluation.metrics import Span, events_of
 from artde_gym.evaluation.result import Result
-from artde_gym.evaluation.store import parse_table, read_episodes
+from artde_gym.evaluation.rollout import nested
+from artde_gym.evaluation.store import parse_table, read_episodes, read_traces
 from artde_gym.metrics_spec import MetricsSpec
 from artde_gym.studies.reproduce.claims import CLAIM_COLUMNS
 
@@ -100,16 +99,16 @@ class Run:
         return None
 
     def _signals(self, scenario: str, controller: str, number: int) -> Signals | None:
-        part = self.ablation.get(scenario)
-        if part is not None and controller in part.result.controllers:
-            return part._signals(scenario, controller, number)
-        path = self.folder / "traces" / scenario / f"{controller}-{number}.npz"
         rows = self.result.rows(scenario, controller)
-        if not path.exists() or number not in rows.index:
+        if number not in rows.index:
             return None
-        with wrap_read_errors("signals", path, "a file that `evaluate` wrote", StoreError):
-            stored = np.load(io.BytesIO(path.read_bytes()), allow_pickle=False)  # a damaged file it would leave open
-            return Signals({name: stored[name] for name in stored.files}, rows.loc[number].to_dict())
+        traces = read_traces(self.place(scenario, controller), scenario, controller, number)
+        return None if traces is None else Signals(traces, rows.loc[number].to_dict())
+
+    def place(self, scenario: str, controller: str) -> Path:
+        """Return the folder that holds the signals of a controller in a scenario."""
+        part = self.ablation.get(scenario)
+        return self.folder if part is None or controller not in part.result.controllers else part.folder
 
 
 @dataclasses.dataclass(frozen=True)
@@ -162,24 +161,3 @@ class Episode:
     @property
     def events(self) -> dict[str, Span]:
         return {name: span for name, span in events_of(self.disturbances).items() if span[0] <= self.end}
-
-
-def nested(columns: Mapping[str, Any]) -> dict[str, Any]:
-    """Columns such as "disturbance.push.0.start" as the nested mappings and lists that they came from."""
-    root: dict[str, Any] = {}
-    for column, value in columns.items():
-        if isinstance(value, float) and np.isnan(value):
-            continue  # of another scenario
-        *path, last = column.split(".")[1:]
-        place = root
-        for part in path:
-            place = place.setdefault(part, {})
-        place[last] = value
-    return _lists(root)
-
-
-def _lists(value: Any) -> Any:
-    if not isinstance(value, dict):
-        return value
-    inner = {key: _lists(item) for key, item in value.items()}
-    return list(inner.values()) if inner and all(key.isdigit() for key in inner) else inner

@@ -16,6 +16,7 @@ from artde_gym.evaluation.environments import ours, robot_of
 from artde_gym.registration import registered_controllers
 from artde_gym.scenarios import SCENARIOS
 from controllers.drive import DRIVES
+from documentation.replays import OF_ENVIRONMENTS
 
 ROOT = Path(__file__).parents[2]
 RAISES = re.compile(r"^Raises:\n((?:    .*\n?)+)", re.MULTILINE)
@@ -55,7 +56,8 @@ def environment(env_id: str) -> str:
     """The page of an environment: its docstring, then what the registries know of it."""
     spec, robot = gym.spec(env_id), robot_of(env_id)
     page = _page(load_env_creator(str(spec.entry_point)))
-    parts = [f"# {env_id}", page, "## Example", EXAMPLE.format(env_id=env_id)]
+    shown = [f"<!-- replay: {OF_ENVIRONMENTS[env_id]} -->"] if env_id in OF_ENVIRONMENTS else []
+    parts = [f"# {env_id}", *shown, page, "## Example", EXAMPLE.format(env_id=env_id)]
     scenarios = [
         f"| {entry.name} | {entry.text} | `{json.dumps(dict(entry.kwargs))}` |"
         for entry in SCENARIOS.values()

@@ -44,6 +44,7 @@ QUICK: dict[str, list[str]] = {
     "reproduce": ["--robot", "quadrotor", "--scenario", "Q1", "--controllers", "pid", "--episodes", "0", *ONCE],
     "train": ["--env", "BipedPush-v0", "--out", "out", "--algo", "none"],
     "report": ["empty"],
+    "replay": ["empty", "--out", "x.html"],
     "video": [*FLYER, "--out", "x.png", "--width", "16", "--disturbances", "{}"],
     "play": ["--env", "nowhere"],
     "list": [],

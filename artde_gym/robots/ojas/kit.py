@@ -136,4 +136,5 @@ KIT = RobotKit(
     motion=Motion("walk", 6.0, 2.0),
     push=Push("chest", 20.0),
     report="artde_gym.robots.ojas.report",
+    scene="artde_gym.robots.ojas.scene:scene",
 )

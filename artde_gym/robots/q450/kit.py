@@ -81,4 +81,5 @@ KIT = RobotKit(
     motion=Motion("flight", 4.0, 29.0),
     push=Push("body", 3.0),
     report="artde_gym.robots.q450.report",
+    scene="artde_gym.robots.q450.scene:scene",
 )

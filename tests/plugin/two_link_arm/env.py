@@ -13,7 +13,9 @@ from artde_gym.disturbances.schedule import Schedule
 from artde_gym.info import EpisodeInfo
 from artde_gym.layout import Field, Layout
 from artde_gym.metrics_spec import EffortSignal, MetricsSpec, TrackedSignal
+from artde_gym.motion.motion import Pose
 from two_link_arm.model import LENGTH, TORQUE, Arm
+from two_link_arm.scene import HEIGHT
 
 JOINTS = ("shoulder", "elbow")
 OBSERVATION = Layout(
@@ -95,6 +97,12 @@ class TwoLinkArmEnv(gym.Env):
             pixels = [tuple(point) for point in np.add(points, (self.width / 2, self.height / 2)).tolist()]
             ImageDraw.Draw(picture).line(pixels, color, self.height // 40, "curve")
         return np.asarray(picture)
+
+    def pose(self):
+        """Return where the arm and its payload are, for replays."""
+        x, z = self.nominal_robot.points(self._q)[2]
+        payload = (x, 0.0, HEIGHT + z) if self._arm.payload else None
+        return Pose((0.0, 0.0, HEIGHT), (0.0, 0.0, 0.0, 1.0), self._q, payload)
 
     def _parsed(self, disturbances):
         return Disturbances.parse(disturbances, self.words["site"], JOINTS, self.robot_name)

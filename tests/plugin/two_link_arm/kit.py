@@ -30,4 +30,5 @@ KIT = RobotKit(
     ),
     motion=Motion("swing", 0.0, 2.0),
     push=Push("tip", 5.0),
+    scene="two_link_arm.scene:scene",
 )

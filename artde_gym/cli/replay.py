@@ -1,0 +1,82 @@
+"""`artde-gym replay`: episodes to be turned and stopped in a browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.progress import Progress, TimeElapsedColumn
+
+from artde_gym.cli.arguments import (
+    Disturbances,
+    Engine,
+    EnvKwargs,
+    Gains,
+    Seed,
+    environment_kwargs,
+    json_object,
+    names,
+    optional_json,
+)
+from artde_gym.cli.display import terminal, words
+from artde_gym.errors import OptionError
+
+
+def replay(
+    folder: Annotated[
+        Path | None, typer.Argument(help="Results folder of `evaluate`. Default: none, an episode is run.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="File to write.")] = Path("replay.html"),
+    scenario: Annotated[str | None, typer.Option(help="Names, comma-separated. Default: all of the folder.")] = None,
+    controllers: Annotated[
+        str | None, typer.Option(help="Names, comma-separated, at most four. Default: the folder's first, or artde.")
+    ] = None,
+    episode: Annotated[
+        int | None, typer.Option(help="Number. Default: worst, median and best of the folder, or 0.")
+    ] = None,
+    env: Annotated[str | None, typer.Option(help="Without a folder: environment id.")] = None,
+    seed: Seed = 0,
+    engine: Engine = None,
+    disturbances: Disturbances = None,
+    env_kwargs: EnvKwargs = None,
+    gains: Gains = None,
+    viewer: Annotated[
+        str | None, typer.Option(help="Address of a viewer that several files share. Default: one in the file.")
+    ] = None,
+) -> None:
+    """Write episodes of a folder, or of a new run, as one HTML file in which a browser shows them."""
+    from artde_gym.evaluation.replay import replay as run_replay  # only when asked for
+    from artde_gym.evaluation.replay import replay_folder
+
+    console = terminal()
+    with Progress(words("description"), TimeElapsedColumn(), console=console, transient=True) as bar:
+        shown = bar.add_task("")
+
+        def told(name: str, time: float) -> None:
+            bar.update(shown, description=f"{name}: {time:.1f} s simulated")
+
+        if folder is None:
+            made = run_replay(
+                names(controllers or "artde"),
+                env,
+                scenario=scenario,
+                seed=seed,
+                episode=episode or 0,
+                disturbances=optional_json("--disturbances", disturbances),
+                env_kwargs=environment_kwargs(env_kwargs, engine),
+                gains=json_object("--gains", gains),
+                on_progress=told,
+            )
+        else:
+            own = {"--env": env, "--engine": engine, "--disturbances": disturbances, "--env-kwargs": env_kwargs}
+            for option, value in {**own, "--gains": gains}.items():
+                if value is not None:
+                    raise OptionError(option, value, "nothing beside a folder: its episodes are as they were run")
+            wanted = None if scenario is None else names(scenario)
+            chosen = None if controllers is None else names(controllers)
+            made = replay_folder(folder, wanted, chosen, episode, on_progress=told)
+    file = made.save(out, viewer=viewer)
+    for note in made.notes:
+        console.print(f"Note: {note}", soft_wrap=True)
+    console.print(f"Written to {file}", soft_wrap=True)

@@ -1,0 +1,17 @@
+"""Replays of docs/gallery in frames, which a browser loads when they come into sight."""
+
+from __future__ import annotations
+
+SHOWN = {
+    "walk": "A walk with a payload under TDE, ARTDE and a stiffer TDE",
+    "push": "A push on the chest under TDE and ARTDE",
+    "flight": "A flight in strong wind under TDE and ARTDE",
+}
+"""Replay -> what it shows, for those who do not see it."""
+OF_ENVIRONMENTS = {"BipedWalk-Payload-v0": "walk", "BipedPush-v0": "push", "QuadInfinity-Payload-v0": "flight"}
+
+
+def frame(name: str, page: str) -> str:
+    """Return the frame of a replay in a page, whose source is named from docs/ on."""
+    source = "../" * page.count("/") + f"gallery/{name}.html"
+    return f'<iframe class="replay-frame" loading="lazy" title="{SHOWN[name]}" src="{source}"></iframe>'
