@@ -1,4 +1,4 @@
-"""A small network on NumPy: features, normalised, through layers of tanh to an action in [-1, 1]^n.
+"""A small network on NumPy: features, normalized, through layers of tanh to an action in [-1, 1]^n.
 
     x = clip((features - mean) / sqrt(variance + 1e-8), -10, 10)
     x = tanh(x W_i + b_i)     for each hidden layer

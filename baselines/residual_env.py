@@ -37,7 +37,7 @@ class ResidualEnv(gym.Wrapper[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[
     `baselines.q450`. Clipped to the bounds.
 
     ## Observation
-    `Box(-inf, inf, (n,), float32)`; `observation_layout` names its fields. Not normalised: that is for training.
+    `Box(-inf, inf, (n,), float32)`; `observation_layout` names its fields. Not normalized: that is for training.
 
     ## Reward
     The sum of the robot's `reward_scales` times terms, at the end of each decision; terms are in `info`, each with

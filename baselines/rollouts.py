@@ -18,7 +18,7 @@ class OpenRollouts(RolloutBuffer):
     """What was decided under a shut gate did nothing; its advantage is the noise of what else happened.
 
     Args:
-        gate: normalised features (n, n_features) -> the gate (n,).
+        gate: normalized features (n, n_features) -> the gate (n,).
     """
 
     def __init__(self, *args: Any, gate: Callable[[NDArray[Any]], NDArray[Any]], **kwargs: Any) -> None:

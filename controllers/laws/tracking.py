@@ -20,7 +20,7 @@ Gain: TypeAlias = "float | Sequence[float]"
 class JointInput(NamedTuple):
     """One sample of n joints, each (..., n), in rad, rad/s, rad/s^2 and Nm (or m, ..., N).
 
-    `tau_applied` is the generalised force that really acted since the sample before.
+    `tau_applied` is the generalized force that really acted since the sample before.
     """
 
     q: Array

@@ -27,7 +27,7 @@ from controllers.laws.tde import ConstantGains, equivalent_gains
 from controllers.laws.tracking import JointInput, components
 from controllers.laws.vectors import joined
 from documentation.architecture import rooms
-from documentation.plant import ARM, DURATION, LIFT, LOADED, PUSHED, Plant, Run, modelled, simulate
+from documentation.plant import ARM, DURATION, LIFT, LOADED, PUSHED, Plant, Run, modeled, simulate
 
 ARM_PERIOD, LIFT_PERIOD = 0.004, 0.015  # s
 NOISE = 0.02  # m/s, of a measured velocity
@@ -163,7 +163,7 @@ def indi() -> str:
 
 def computed() -> str:
     gains = ComputedTorqueGains(25.0, 10.0)
-    runs = {"computed-torque": simulate(modelled(ARM), gains, ARM, ARM_PERIOD), "tde": arm("tde")}
+    runs = {"computed-torque": simulate(modeled(ARM), gains, ARM, ARM_PERIOD), "tde": arm("tde")}
     charts = {"error": errors(runs, log=True)}
     before = {name: _rms(run, run.time < LOADED) for name, run in runs.items()}
     after = {name: _rms(run, run.time >= LOADED) for name, run in runs.items()}

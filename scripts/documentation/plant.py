@@ -99,7 +99,7 @@ def simulate(law: Law, gains: Any, plant: Plant, period: float, *, duration: flo
     return Run(plant, time, np.array(errors), np.array(forces), names)
 
 
-def modelled(plant: Plant) -> Law:
+def modeled(plant: Plant) -> Law:
     """Computed torque with the plant's own equation, but for the load, which it does not know."""
 
     def start(_gains: Any, _signals: JointInput, _period: float) -> Nothing:
