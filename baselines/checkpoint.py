@@ -23,7 +23,7 @@ KEPT = 2
 
 
 class Checkpoints:
-    """Those of one run."""
+    """Checkpoints of one run."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

@@ -15,7 +15,7 @@ KEPT = 5  # one in so many of the others is learnt from, for the values there
 
 
 class OpenRollouts(RolloutBuffer):
-    """What was decided under a shut gate did nothing; its advantage is the noise of what else happened.
+    """Rollouts without the decisions under a shut gate, which did nothing: their advantage is noise.
 
     Args:
         gate: normalized features (n, n_features) -> the gate (n,).

@@ -31,7 +31,7 @@ class Heading(NamedTuple):
 
 
 def heading(yaw: Array, rate: Array) -> Heading:
-    """The heading of a yaw angle (rad) that turns at `rate` (rad/s)."""
+    """Return the heading of a yaw angle (rad) that turns at `rate` (rad/s)."""
     return Heading(np.cos(yaw), np.sin(yaw), rate)
 
 

@@ -175,7 +175,7 @@ def computed() -> str:
 
 
 def geometric() -> str:
-    """A rigid body turns back from a tilt about a skew axis."""
+    """Turn a rigid body back from a tilt about a skew axis."""
     gains = DRIVES["q450"].presets["geometric", "hand"].gains.attitude
     period, count = LIFT_PERIOD, round(2.0 / LIFT_PERIOD)
     time = period * np.arange(count)
@@ -237,13 +237,13 @@ def gains_of(robot: str, law: str, preset: str | None = None) -> Any:
 
 @functools.cache
 def arm(law: str, *, preset: str | None = None, period: float = ARM_PERIOD) -> Run:
-    """The arm at the biped's gains."""
+    """Simulate the arm at the biped's gains."""
     return _run(law, gains_of("ojas", law, preset), ARM, period)
 
 
 @functools.cache
 def lift(law: str, gains: str | None = None, preset: str | None = None, noise: float = 0.0) -> Run:
-    """The vertical axis at the gains of the quadrotor's position loop, those of the law's own name by default."""
+    """Simulate the vertical axis at the position loop's gains, by default those of the law's own name."""
     return _run(law, gains_of("q450", gains or law, preset).position, LIFT, LIFT_PERIOD, noise)
 
 
@@ -272,7 +272,7 @@ def errors(runs: Mapping[str, Run], *, log: bool = False) -> str:
 
 
 def inside(run: Run, name: str) -> Signal:
-    """A number, or the size of the one component, that the law remembers."""
+    """Return a scalar of the law's state, or the magnitude of its one component."""
     return run.time, np.abs(run.inside[name]).reshape(len(run.time))
 
 

@@ -100,7 +100,7 @@ def simulate(law: Law, gains: Any, plant: Plant, period: float, *, duration: flo
 
 
 def modeled(plant: Plant) -> Law:
-    """Computed torque with the plant's own equation, but for the load, which it does not know."""
+    """Compute torque by the plant's own equation, without the load, which it does not know."""
 
     def start(_gains: Any, _signals: JointInput, _period: float) -> Nothing:
         return Nothing()
