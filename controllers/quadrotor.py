@@ -88,7 +88,7 @@ class QuadrotorPolicy(Policy):
         return named
 
     def diagnostics(self, state: Any) -> dict[str, Array]:
-        """Return the internals and `attitude_error` (..., 3): desired minus actual roll, pitch, yaw (rad, -pi to pi)."""
+        """Return the internals and `attitude_error` (..., 3): desired minus actual roll, pitch, yaw (rad)."""
         memory: CascadeState = state
         error = _roll_pitch_yaw(memory.axes_ref) - _roll_pitch_yaw(memory.axes)
         wrapped = np.asarray(np.remainder(error + np.pi, 2 * np.pi) - np.pi)
