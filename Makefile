@@ -38,9 +38,10 @@ lowest: $(VENV)-lowest/dev  ## the tests with the lowest versions that pyproject
 clients: $(VENV)/core  ## train with learning libraries, in environments of their own (some: ARGS="tianshou rllib")
 	$(BIN)/python scripts/clients.py $(ARGS)
 
-check: $(VENV)/dev  ## format, lint, types and import contracts
+check: $(VENV)/dev  ## format, lint, spelling, types and import contracts
 	$(BIN)/ruff format --check
 	$(BIN)/ruff check
+	$(BIN)/codespell
 	$(BIN)/basedpyright --pythonpath $(BIN)/python
 	$(BIN)/lint-imports
 

@@ -1,4 +1,4 @@
-"""How an agent is coupled to a robot: what it sees, and how its action becomes an acceleration."""
+"""Coupling of an agent to a robot: its features, and the acceleration that its action becomes."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class ActionAdapter(Protocol):
         ...
 
     def observe(self, observation: Array, inside: Mapping[str, Array], state: Any) -> tuple[Array, Any]:
-        """What the agent sees (..., n_features), and memory.
+        """Return the agent's features (..., n_features) and the next state.
 
         Args:
             observation: of the environment.
@@ -37,7 +37,7 @@ class ActionAdapter(Protocol):
         ...
 
     def next_residual(self, state: Any) -> tuple[Array, Any]:
-        """The acceleration du (..., n) for one control period, and memory."""
+        """Return the acceleration du (..., n) of one control period and the next state."""
         ...
 
     def reward_terms(self, observation: Array, state: Any, fell: Any) -> dict[str, Array]:
@@ -46,5 +46,5 @@ class ActionAdapter(Protocol):
 
 
 def total(scales: Mapping[str, float], terms: Mapping[str, Array]) -> Array:
-    """The sum of scales times terms."""
+    """Sum scales times terms."""
     return np.asarray(sum(scale * terms[name] for name, scale in scales.items()))

@@ -18,7 +18,7 @@ JOINTS = "joints"
 @renamed_arguments({"coupling": "adapter", "channels": "action_modes", "hold": "decision_period"})
 @dataclasses.dataclass(frozen=True)
 class Agent:
-    """How a residual acts on one robot, and what it is trained on.
+    """Action, features and training tasks of a residual on one robot.
 
     Attributes:
         robot: by the environments' `robot_name`.

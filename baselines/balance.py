@@ -3,7 +3,7 @@
     [swing_x, body_x, stance_pitch, lean_pitch] = K_1 [pitch, pitch rate, velocity error x, displacement x]
     [swing_out, body_y, stance_roll]            = K_2 [roll, roll rate, velocity error y, displacement y]
 
-in the mirror, under the gate, and clipped to [-1, 1], as of `baselines.ojas`. A classical rival of learned residuals:
+in the mirror, under the gate, and clipped to [-1, 1], as in `baselines.ojas`. A classical rival of learned residuals:
 it acts through the same channel, on the same features, and is written as a network of one layer.
 """
 
@@ -25,7 +25,7 @@ GAINS = 4 * sum(len(outputs) for outputs, *_ in _PLANES)
 
 
 def balance_network(gains: NDArray[np.float64], features: Layout, actions: tuple[str, ...]) -> Network:
-    """The law with its 28 gains, each the share of an action's range for a large input."""
+    """Compute the law from its 28 gains, each the share of an action's range for a large input."""
     weight = np.zeros((features.size, len(actions)), np.float32)
     rows = iter(gains.reshape(-1, 4))
     for outputs, tilt, rate, axis in _PLANES:

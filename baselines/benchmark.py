@@ -1,4 +1,4 @@
-"""How long a policy takes to act, and how fast one is trained: sections of `artde-gym benchmark`."""
+"""Time of a policy's call and speed of training: sections of `artde-gym benchmark`."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def _times(folder: Path, rounds: int) -> dict[str, float]:
 
 
 def _flight(env: Any, policy: Any, steps: int) -> tuple[list[Array], list[Array]]:
-    """What a policy sees of an episode's beginning, and what its network does at every decision."""
+    """Record a policy's observations at the start of an episode and its network's actions."""
     observations: list[Array] = []
     features: list[Array] = []
     observation, _ = env.reset(seed=0)
@@ -133,7 +133,7 @@ class _Clock:
         self.seconds = 0.0
 
     def timed(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """The same function, its time counted."""
+        """Wrap a function so that its time is counted."""
 
         def call(*args: Any, **kwargs: Any) -> Any:
             began = time.process_time()

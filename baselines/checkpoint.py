@@ -1,7 +1,7 @@
 """Checkpoints of a training: everything that the rest of it depends on, written at once, read without executing.
 
 A checkpoint is a folder whose number counts intervals. All random numbers of an interval come from the training's seed
-and that number, and every interval begins with fresh episodes: so parameters, optimiser and normalizer (for SAC also
+and that number, and every interval begins with fresh episodes: so parameters, optimizer and normalizer (for SAC also
 the replay buffer) are the whole state, and a training that was killed and continued equals one that was not.
 """
 
@@ -23,7 +23,7 @@ KEPT = 2
 
 
 class Checkpoints:
-    """Those of one run."""
+    """Checkpoints of one run."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

@@ -11,7 +11,7 @@ from baselines.network import Network
 
 
 def exported(model: Any, normalizer: Any) -> Network:
-    """The deterministic actor of a PPO or SAC model with its normalizer."""
+    """Export the deterministic actor of a PPO or SAC model with its normalizer."""
     policy = model.policy
     squashed = hasattr(policy, "actor")
     modules = [*policy.actor.latent_pi, policy.actor.mu] if squashed else []

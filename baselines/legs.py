@@ -84,7 +84,7 @@ def joint_offsets(ankles: Array, offsets: Array) -> Array:
 
 
 def level(tilt: Array, v: Array) -> Array:
-    """A vector in base axes in level axes that share the base's heading: R_y(pitch) R_x(roll) v."""
+    """Rotate a vector from base axes to level axes of the same heading: R_y(pitch) R_x(roll) v."""
     sin_roll, sin_pitch = np.sin(tilt[..., 0]), np.sin(tilt[..., 1])
     cos_roll, cos_pitch = np.cos(tilt[..., 0]), np.cos(tilt[..., 1])
     x, y, z = v[..., 0], v[..., 1], v[..., 2]

@@ -1,4 +1,4 @@
-"""A small network on NumPy: features, normalised, through layers of tanh to an action in [-1, 1]^n.
+"""A small network on NumPy: features, normalized, through layers of tanh to an action in [-1, 1]^n.
 
     x = clip((features - mean) / sqrt(variance + 1e-8), -10, 10)
     x = tanh(x W_i + b_i)     for each hidden layer
@@ -53,7 +53,7 @@ class Network:
         return (1.0 / np.sqrt(self.variance.astype(np.float64) + EPSILON)).astype("f4")
 
     def __call__(self, features: Array) -> Float:
-        """The action (..., n_actions) for features (..., n_features)."""
+        """Return the action (..., n_actions) for features (..., n_features)."""
         x = (features.astype(np.float32) - self.mean) * self._scale
         x = np.minimum(np.maximum(x, -CLIP), CLIP)[..., None, :]  # one product a row: a batch rounds differently
         last = len(self.layers) - 1

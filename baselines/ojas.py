@@ -54,13 +54,13 @@ RANGES: dict[str, dict[str, float]] = {
 FILTER_RATE = 25.0  # rad/s
 K_P, K_D = 25.0, 10.0  # of the error dynamics that the thesis asks for
 OPENS_TILT = (0.03, 0.08)  # rad, where the gate begins to open, and where it is open; a walk without pushes: 0.016
-OPENS_SPEED = (0.08, 0.16)  # m/s, likewise; a walk without pushes: 0.055
+OPENS_SPEED = (0.08, 0.16)  # m/s, as above; a walk without pushes: 0.055
 CLOSING = 0.5  # s, time constant of the closing gate
 DIFFERENCE = 1e-4  # s, of the reference velocity's difference quotient
 
 
 class OjasAdapterState(NamedTuple):
-    """What lasts.
+    """State of the adapter between decisions.
 
     Attributes:
         right: whether the right leg carries (...).
@@ -122,7 +122,7 @@ class OjasAdapter:
                 Field("tilt", 2, "rad", -1.0, 1.0, "roll and pitch of the base"),
                 Field("angular_velocity", 3, "rad/s", -20.0, 20.0, "of the base"),
                 Field("velocity_error", 3, "m/s", -5.0, 5.0, "of the base, actual minus reference"),
-                Field("displacement", 3, "m", -1.0, 1.0, "of the base over the standing foot, likewise"),
+                Field("displacement", 3, "m", -1.0, 1.0, "of the base over the standing foot, in the same axes"),
                 Field("contact", 2, "1", 0.0, 1.0, "of the standing and the swinging foot"),
                 Field("load_ref", 1, "1", 0.0, 1.0, "share of the weight meant for the standing foot"),
                 Field("progress", 1, "1", 0.0, 1.0, "within the step"),

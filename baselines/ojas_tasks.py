@@ -1,4 +1,4 @@
-"""What is trained on the biped."""
+"""Training tasks of the biped."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _AXES = [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]
 
 
 def push(magnitude: Any, direction: Any = None, start: Any = None, duration: Any = 0.2) -> dict[str, Any]:
-    """A push on the chest, from any side and during any step without further ado."""
+    """Return a push on the chest, from any side and during any step."""
     return {
         "body": "chest",
         "magnitude": magnitude,

@@ -46,7 +46,7 @@ def _positive(high: float) -> Option:
 
 
 def _or(option: Option, value: Any) -> Option:
-    """The same, or one value besides."""
+    """Allow one further value."""
     text = "None" if value is None else repr(value)
     return Option(lambda given: given == value or option.good(given), f"{option.allowed}, or {text}")
 

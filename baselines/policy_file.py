@@ -103,7 +103,7 @@ def read(folder: Path) -> Saved:
 
 
 def _saved(description: Mapping[str, Any], content: bytes) -> Saved:
-    """A policy from what its two files hold, every field checked."""
+    """Build a policy from its two files, every field checked."""
     shape = _of("network", description["network"], dict)
     if shape["activation"] != "tanh":
         raise PolicyFileError("network: activation", shape["activation"], "'tanh'")
@@ -122,7 +122,7 @@ def _saved(description: Mapping[str, Any], content: bytes) -> Saved:
 
 
 def _of(field: str, value: Any, kind: type[T]) -> T:
-    """The value, if it is of that kind.
+    """Return the value if it is of that type.
 
     Raises:
         PolicyFileError: if it is not.

@@ -1,4 +1,4 @@
-"""What is trained on the quadrotor."""
+"""Training tasks of the quadrotor."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ class Residual:
         return ResidualState(self.base.start(self.base.read(observation)), self.adapter.start(observation))
 
     def observe(self, observation: Array, state: ResidualState) -> tuple[Array, ResidualState]:
-        """What the agent sees (..., n_features), and memory."""
+        """Return the agent's features (..., n_features) and the next state."""
         inside = {
             **self.base.internals(state.base),
             **self.base.preview(state.base, self.base.read(observation)),
@@ -85,7 +85,7 @@ class Residual:
     def control(
         self, observation: Array, state: ResidualState, more: Array | None = None
     ) -> tuple[Array, ResidualState]:
-        """The force for one control period, within the actuators' bounds, and memory; `more` is added to du."""
+        """Return the bounded force of one control period and the next state; `more` is added to du."""
         du, adapter = self.adapter.next_residual(state.adapter)
         if more is not None:
             du = du + more
@@ -151,7 +151,7 @@ class ResidualPolicy(Policy):
         return self.residual.base.internals(state.residual.base)
 
     def diagnostics(self, state: Any) -> dict[str, Array]:
-        """What the base tells, and the agent's `action` and, on the biped, `gate`."""
+        """Return the base's diagnostics, the agent's `action` and, on the biped, `gate`."""
         memory: PolicyState = state
         named = flatten(memory.residual.adapter)
         own = {f"agent_{name}": named[name] for name in ("action", "gate") if name in named}

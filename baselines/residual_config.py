@@ -1,4 +1,4 @@
-"""What a residual is, as data: everything but its network that an agent needs to be run again."""
+"""Configuration of a residual: all that an agent needs to run again, except its network."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class ResidualEnv(gym.Wrapper[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[
     `baselines.q450`. Clipped to the bounds.
 
     ## Observation
-    `Box(-inf, inf, (n,), float32)`; `observation_layout` names its fields. Not normalised: that is for training.
+    `Box(-inf, inf, (n,), float32)`; `observation_layout` names its fields. Not normalized: that is for training.
 
     ## Reward
     The sum of the robot's `reward_scales` times terms, at the end of each decision; terms are in `info`, each with
@@ -101,10 +101,10 @@ class ResidualEnv(gym.Wrapper[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[
 
 
 def agent_space(residual: Residual) -> Box:
-    """What an agent sees, as a space."""
+    """Return the space of an agent's features."""
     return Box(-np.inf, np.inf, (residual.features.size,), np.float32)
 
 
 def action_space(residual: Residual) -> Box:
-    """What an agent does, as a space."""
+    """Return the space of an agent's actions."""
     return Box(-1.0, 1.0, (len(residual.actions),), np.float32)

@@ -15,10 +15,10 @@ KEPT = 5  # one in so many of the others is learnt from, for the values there
 
 
 class OpenRollouts(RolloutBuffer):
-    """What was decided under a shut gate did nothing; its advantage is the noise of what else happened.
+    """Rollouts without the decisions under a shut gate, which did nothing: their advantage is noise.
 
     Args:
-        gate: normalised features (n, n_features) -> the gate (n,).
+        gate: normalized features (n, n_features) -> the gate (n,).
     """
 
     def __init__(self, *args: Any, gate: Callable[[NDArray[Any]], NDArray[Any]], **kwargs: Any) -> None:

@@ -44,7 +44,7 @@ LABELS = {"cma-es": "balance"}
 @renamed_arguments({"recipe": "config"})
 @dataclasses.dataclass(frozen=True)
 class Training:
-    """What is trained; the same configuration continues its run, also with more steps or other options.
+    """Configuration of a training; the same one resumes its run, also with more steps or other options.
 
     Attributes:
         env_id: of the environment.
@@ -129,7 +129,7 @@ class Run:
 
     @property
     def batched(self) -> bool:
-        """Whether all environments are one batch: of the task's engine, if it names one."""
+        """True if all environments are one vector: in the task's engine, if it names one."""
         engine = self.task.batch_engine
         if self.task.batch is None:
             return False
@@ -137,7 +137,7 @@ class Run:
 
     @property
     def vectorized(self) -> bool:
-        """Whether the held-out tests run in a vector environment."""
+        """True if the held-out tests run in a vector environment."""
         return self.batched
 
     @property
@@ -237,7 +237,7 @@ def single(env_id: str, kwargs: dict[str, Any], config: ResidualConfig) -> Resid
 
 
 def _plain(training: Training) -> dict[str, Any]:
-    """A training as JSON holds it.
+    """Return a training in JSON's types.
 
     Raises:
         TrainingError: for values that JSON cannot write.

@@ -22,7 +22,7 @@ EXPORT = "policy"
 
 
 def load(path: str | Path, env: Any = None) -> ResidualPolicy:
-    """A saved policy, ready to `predict`.
+    """Load a saved policy, ready to `predict`.
 
     Args:
         path: its folder, or that of the training run that made it.
@@ -41,7 +41,7 @@ def load(path: str | Path, env: Any = None) -> ResidualPolicy:
 
 
 def make_shipped(env: Any, *, policies: dict[str, str]) -> ResidualPolicy:
-    """A policy of this package for an environment.
+    """Load a shipped policy for an environment.
 
     Args:
         env: the environment that it will drive.
@@ -62,7 +62,7 @@ def make_shipped(env: Any, *, policies: dict[str, str]) -> ResidualPolicy:
 
 
 def _trained_in(saved: Saved) -> Any:
-    """The environment of a policy's training, built only if its robot does not tell what the policy has to know."""
+    """Return a policy's training environment, built only if its robot alone does not suffice."""
     agent = agent_of(saved.config.robot)
     if agent.observation is not None and agent.action is not None:
         if saved.nominal not in agent.nominal:
@@ -75,7 +75,7 @@ def _trained_in(saved: Saved) -> Any:
 
 
 class _Trained:
-    """What a policy has to know of the environment of its training, without building it."""
+    """Layouts and robot of a training's environment, without building it."""
 
     def __init__(self, saved: Saved, observation: Layout, action: Layout, nominal_robot: Any) -> None:
         self.robot_name = saved.config.robot
@@ -89,7 +89,7 @@ class _Trained:
 
 
 def nominal_name(robot: str, env_kwargs: dict[str, Any]) -> str:
-    """How a policy's file names the nominal robot of an environment."""
+    """Return the name by which a policy file refers to an environment's nominal robot."""
     name = agent_of(robot).nominal_name
     return robot if name is None else name(env_kwargs)
 

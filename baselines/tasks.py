@@ -1,4 +1,4 @@
-"""What is trained where: the task of each environment."""
+"""Training task of each environment."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _PPO = {"n_steps": 128, "batch_size": 64, "n_epochs": 6, "learning_rate": 3e-4, 
 
 
 def task(env_id: str) -> Task:
-    """The task of an environment.
+    """Return the task of an environment.
 
     Raises:
         UnknownNameError: if no robot has this environment.
@@ -29,7 +29,7 @@ def task(env_id: str) -> Task:
 
 
 def own_task(env_id: str) -> Task:
-    """The task of an environment without one: its own disturbances, and as little tracking error as possible."""
+    """Return the task of an environment that has none: its own disturbances, the least tracking error."""
     metric = f"rmse_{metrics_spec_of(env_id).errors[0].unit}"
 
     def score(rows: pd.DataFrame) -> float:

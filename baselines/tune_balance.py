@@ -1,7 +1,7 @@
 """Tuning the linear balance law by an evolution strategy (CMA-ES, Hansen 2016), in generations that can be continued.
 
-Every generation meets the same new pushes with all of its candidates. What is judged on held-out seeds and exported is
-the mean of the distribution. The state is the list of values told so far: telling them again gives the same generator.
+Every generation meets the same new pushes with all of its candidates. The distribution's mean is judged on
+held-out seeds and exported. The state is the list of values told so far: telling them again gives the same generator.
 """
 
 from __future__ import annotations

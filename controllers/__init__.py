@@ -15,7 +15,7 @@ __all__ = ["GainError", "make"]
 
 
 def make(name: str, env: Any, **overrides: Any) -> Any:
-    """The controller called `name` for an environment, or for a vector of equal ones.
+    """Make the controller called `name` for an environment, or for a vector of equal ones.
 
     Args:
         name: "tde", "atde", "artde", "artde-robust", "pid", "tde+c", "tde+kd", for the biped "computed-torque" and
@@ -27,7 +27,7 @@ def make(name: str, env: Any, **overrides: Any) -> Any:
             loops a gain has the suffix `_p` (position) or `_q` (attitude).
 
     Raises:
-        UnknownNameError: for a controller that nobody registered or that the robot does not have, or an unknown preset.
+        UnknownNameError: for a controller that is not registered or that the robot does not have, or an unknown preset.
         GainError: for an unknown gain or a value that is not allowed.
     """
     return make_controller(name, env, **overrides)

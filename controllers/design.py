@@ -32,7 +32,7 @@ DELAYED = ("tde", "atde", "artde", "tde+c", "tde+kd")
 
 @dataclasses.dataclass(frozen=True)
 class Design:
-    """What the gains of one loop mean at a sampling period.
+    """Validity and stiffness of one loop's gains at a sampling period.
 
     Attributes:
         loop: that they drive.
@@ -83,7 +83,7 @@ class Design:
         return 1.0 / self.used
 
     def to_dict(self) -> dict[str, Any]:
-        """All of it as JSON has it; what is not a number as None."""
+        """Return all of it in JSON's types, NaN as None."""
         loop = self.loop
         joints = zip(loop.joints, self.m_bar, self.joint_limits, self.stiffness, strict=True)
         return {
@@ -133,7 +133,7 @@ def loops(robot: str, **motion: Any) -> list[Loop]:
 
 
 def designed() -> dict[str, Callable[..., list[Loop]]]:
-    """Robots with loops to be judged, and what lists those."""
+    """Return the robots whose loops can be judged, with the functions that list their loops."""
     return {robot: drive.loops for robot, drive in DRIVES.items() if drive.loops is not None}
 
 
@@ -201,6 +201,6 @@ def _number(value: float) -> float | None:
 
 
 def _of_loop(gains: Any, loop: Loop, law: str, period: float) -> TdeGains:
-    """The gains of one loop, of a cascade or whole, as the law runs them."""
+    """Return the gains of one loop, of a cascade or whole, as the law runs them."""
     own = getattr(gains, loop.name) if loop.name in LOOPS else gains
     return LAWS[law].convert(own, period)

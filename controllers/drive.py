@@ -1,4 +1,4 @@
-"""Everything that `controllers` knows of a robot, as one frozen object that a plug-in brings."""
+"""All that `controllers` knows of a robot, in one frozen object that a plug-in can bring."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ Ranges: TypeAlias = dict[str, tuple[float, float]]
 
 @dataclasses.dataclass(frozen=True)
 class Drive:
-    """How one robot is driven.
+    """Presets, tuning ranges and policies of one robot.
 
     Attributes:
         robot: by the environments' `robot_name`.
         presets: (law, preset) -> gains; a law's first preset is its default.
-        ranges: law -> where tuning may look for its gains.
+        ranges: law -> ranges in which tuning searches its gains.
         make: builds its policies, called as make(env, law=..., **options); None for one law on all joints, see
             `controllers.joint_space.make_joint_space`.
         period: sampling period of its environments where nothing else is asked for (s).

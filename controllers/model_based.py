@@ -37,7 +37,7 @@ class ComputedTorquePolicy(TrackingPolicy):
 
 
 def make_computed_torque(env: Any, *, preset: str | None = None, **gains: Any) -> ComputedTorquePolicy:
-    """The policy for a biped environment, at preset gains with some replaced.
+    """Make the policy for a biped environment, at preset gains with some replaced.
 
     Raises:
         UnknownNameError, GainError: as `controllers.joint_space.make_joint_space`.
@@ -49,5 +49,5 @@ def make_computed_torque(env: Any, *, preset: str | None = None, **gains: Any) -
 
 
 def tuning_space(env: Any) -> dict[str, GainRange]:
-    """Where tuning may look for the gains."""
+    """Return the ranges in which tuning searches the gains."""
     return gain_ranges(ControlInterface.of(env).robot, "computed-torque", None)

@@ -1,6 +1,6 @@
 """Control laws as policies: observation in, action out, with Stable-Baselines3's `predict`.
 
-A policy holds no state of its own. What a law remembers goes out of `predict` and comes back in as `state`, a tuple of
+A policy holds no state of its own. Its law's state goes out of `predict` and comes back in as `state`, a tuple of
 arrays with the observations' leading axes, so that one policy object serves any number of environments at once.
 """
 
@@ -18,7 +18,7 @@ from controllers.laws.tracking import Array, JointInput, LawState
 
 
 class ControlInterface(NamedTuple):
-    """What a policy has to know of the environment that it drives."""
+    """An environment as its policy knows it: robot, layouts, bounds and control period."""
 
     robot: str
     observation: Layout
@@ -55,19 +55,19 @@ class Policy(abc.ABC):
 
     @abc.abstractmethod
     def read(self, observation: Array) -> Any:
-        """The signals of one sample in an observation (..., n_obs)."""
+        """Return the signals of one sample in an observation (..., n_obs)."""
 
     @abc.abstractmethod
     def start(self, signals: Any) -> LawState:
-        """Memory before the first sample."""
+        """Return the state before the first sample."""
 
     @abc.abstractmethod
     def step(self, state: Any, signals: Any, observation: Array) -> tuple[Array, LawState]:
-        """One sample: force (..., n) before saturation, and the memory for the next one."""
+        """Compute one sample: force (..., n) before saturation, and the next state."""
 
     @abc.abstractmethod
     def with_residual(self, signals: Any, du: Array) -> Any:
-        """The signals with `du` (..., n) added to the reference acceleration, and so to the desired one of any law."""
+        """Add `du` (..., n) to the reference acceleration, and so to the desired one of any law."""
 
     def predict(
         self,
@@ -78,12 +78,12 @@ class Policy(abc.ABC):
         *,
         residual: ArrayLike | None = None,
     ) -> tuple[Array, LawState]:
-        """The action for one observation (n_obs,) or for many (n_env, n_obs).
+        """Return the action for one observation (n_obs,) or for many (n_env, n_obs).
 
         Args:
             observation: as the environment gave it; float32 stays float32.
             state: what the call before returned; None at the start.
-            episode_start: one truth value an environment; where it is true, that environment's memory is cleared.
+            episode_start: one truth value an environment; where it is true, that environment's state is cleared.
             deterministic: of the protocol; a law has no randomness.
             residual: du (..., n), added to the law's desired acceleration; zero is the same as none, bit for bit.
 
@@ -108,15 +108,15 @@ class Policy(abc.ABC):
         return clipped if clipped.dtype == force.dtype else clipped.astype(force.dtype), state
 
     def internals(self, state: LawState) -> dict[str, Array]:
-        """What the memory holds of the law's inside, by name: sigma, s, beta, c, ..., as far as it has them."""
+        """Return the law's internal signals by name: sigma, s, beta, c, ..., as far as it has them."""
         return flatten(state)
 
     def diagnostics(self, state: LawState) -> dict[str, Array]:
-        """What is remembered and what follows from it, for those who look on."""
+        """Return the internals and all that follows from them, for traces and metrics."""
         return self.internals(state)
 
     def preview(self, state: LawState, signals: Any) -> dict[str, Array]:
-        """What the next step is about to see, by name, where the observation alone does not tell it."""
+        """Return signals of the next step by name that the observation alone does not hold."""
         del state, signals
         return {}
 

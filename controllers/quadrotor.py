@@ -57,7 +57,7 @@ class QuadrotorPolicy(Policy):
         )
 
     def with_residual(self, signals: QuadrotorInput, du: Array) -> QuadrotorInput:
-        """Of the position, and of the attitude if `du` (..., 6) goes on with it (rad/s^2, body axes)."""
+        """Add to the position's acceleration, and to the attitude's if `du` is (..., 6) (rad/s^2, body axes)."""
         position = signals.acceleration_ref + du[..., :AXES]
         return signals._replace(acceleration_ref=position, turning_ref=du[..., AXES:] if du.shape[-1] > AXES else None)
 
@@ -73,9 +73,9 @@ class QuadrotorPolicy(Policy):
         return cascade(self._position, self._attitude, self.gains, state, signals, self._period)
 
     def internals(self, state: Any) -> dict[str, Array]:
-        """What the memory holds of the inside.
+        """Return the internal signals of both loops.
 
-        Of each loop what its law has (sigma, s, beta, c, ...), by name with the suffix `_p` (position) or `_q`
+        Signals of each loop's law (sigma, s, beta, c, ...) carry the suffix `_p` (position) or `_q`
         (attitude); `force_command` (..., 3), tau_p (N, world axes).
         """
         memory: CascadeState = state
@@ -88,7 +88,7 @@ class QuadrotorPolicy(Policy):
         return named
 
     def diagnostics(self, state: Any) -> dict[str, Array]:
-        """What is remembered; `attitude_error` (..., 3), desired minus actual roll, pitch and yaw (rad), -pi to pi."""
+        """Return the internals and `attitude_error` (..., 3): desired minus actual roll, pitch, yaw (rad)."""
         memory: CascadeState = state
         error = _roll_pitch_yaw(memory.axes_ref) - _roll_pitch_yaw(memory.axes)
         wrapped = np.asarray(np.remainder(error + np.pi, 2 * np.pi) - np.pi)
@@ -111,7 +111,7 @@ _LOOPS: dict[str, tuple[Entry, Entry]] = {
 
 
 def make_quadrotor(env: Any, *, law: str, preset: str | None = None, **gains: Any) -> QuadrotorPolicy:
-    """The policy of a law for a quadrotor's environment, at preset gains with some replaced.
+    """Make the policy of a law for a quadrotor's environment, at preset gains with some replaced.
 
     Args:
         env: the environment that it will drive.

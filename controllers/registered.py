@@ -20,7 +20,7 @@ CONTROLLERS = (
     _law("pid", "PID; biped: equal to TDE, quadrotor: positional, in both loops", law="pid"),
     _law("tde+c", "TDE + robust term of constant gain (ablation)", law="tde+c"),
     _law("tde+kd", "TDE at the stiffer gains equivalent to it (ablation)", law="tde+kd"),
-    _law("asmc", "quadrotor: adaptive sliding mode (a law of ours)", law="asmc"),
+    _law("asmc", "quadrotor: adaptive sliding mode (this project's own law)", law="asmc"),
     _law("indi", "quadrotor: incremental nonlinear dynamic inversion", law="indi"),
     _law("geometric", "quadrotor: geometric control on SE(3), with an integral", law="geometric"),
     ControllerSpec(

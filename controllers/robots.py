@@ -1,4 +1,4 @@
-"""Which kind of policy drives which robot."""
+"""Policies and tuning ranges for the robot of an environment."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from controllers.presets import gain_ranges
 
 
 def make_for_robot(env: Any, *, law: str, **options: Any) -> Policy:
-    """The policy of a law for the robot of an environment.
+    """Make the policy of a law for the robot of an environment.
 
     Args:
         env: the environment that it will drive.
@@ -30,9 +30,9 @@ def make_for_robot(env: Any, *, law: str, **options: Any) -> Policy:
 
 
 def tuning_space(env: Any, *, law: str, preset: str | None = None) -> dict[str, GainRange]:
-    """Where tuning may look for the gains of a law for the robot of an environment.
+    """Return the ranges in which tuning searches a law's gains for the robot of an environment.
 
     Raises:
-        UnknownNameError: for a law or preset that the robot does not have, or a law whose gains nobody tunes.
+        UnknownNameError: for a law or preset that the robot does not have, or a law without tuning ranges.
     """
     return gain_ranges(ControlInterface.of(env).robot, law, preset)

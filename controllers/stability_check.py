@@ -1,4 +1,4 @@
-"""Whether time-delay estimation converges at the gains that are shipped, for `artde-gym doctor`."""
+"""Check for `artde-gym doctor` that time-delay estimation converges at the shipped gains."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ REMEDY = "choose a smaller m_bar, or another actuator model"
 
 
 def stability() -> list[CheckResult]:
-    """Time-delay estimation converges: eigenvalues of M^-1 m_bar in (0, 2).
+    """Check that time-delay estimation converges: eigenvalues of M^-1 m_bar in (0, 2).
 
     Every robot: by the check that its drive brings, else all presets of all loops.
     """

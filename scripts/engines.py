@@ -1,4 +1,4 @@
-"""Where the two physics engines agree and where they differ, in the figures of docs/engines.md.
+"""Comparison of the two physics engines: the figures of docs/engines.md.
 
 python scripts/engines.py errors        RMS tracking errors in S1, S2 and S3 at L = 1 and 2 ms
 python scripts/engines.py falls         rates of falls at L = 4 ms, over seeds
@@ -65,7 +65,7 @@ def falls(options: argparse.Namespace) -> None:
 
 
 def both(scenario: str, options: argparse.Namespace, **kwargs: Any) -> dict[str, Result]:
-    """The same seeds in both engines."""
+    """Run the same seeds in both engines."""
     kwargs["actuator_inertia"] = options.actuator_inertia
     return {
         engine: evaluate(
@@ -113,7 +113,7 @@ def solved(scenario: str, period: float, count: int | None, options: argparse.Na
 
 
 def make(scenario: str, engine: str, options: argparse.Namespace, **changes: Any) -> Any:
-    """The environment of a scenario, without wrappers."""
+    """Return the environment of a scenario, without wrappers."""
     entry = SCENARIOS[scenario]
     kwargs = {**entry.kwargs, "actuator_inertia": options.actuator_inertia, "engine": engine, **changes}
     return gym.make(entry.env_id, disable_env_checker=True, disturbances=entry.disturbances, **kwargs).unwrapped

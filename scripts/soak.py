@@ -1,4 +1,4 @@
-"""What the tests do in short, for hours: walks, short episodes, environments, damaged files, random calls, kills.
+"""Long versions of the tests, for hours: walks, short episodes, environments, damaged files, random calls, kills.
 
 make soak                                   everything, some hours
 make soak ARGS="walks --seconds 600"        one part

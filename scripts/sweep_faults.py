@@ -114,7 +114,7 @@ class Campaign:
         print(f"complete: all {len(self.whole)} episodes, each once, equal to the last bit")
 
     def _check(self, when: str) -> None:
-        """What is stored is whole, true, and no less than before."""
+        """Check that the stored parts are whole, true, and no fewer than before."""
         if not (self._folder / "sweep.json").exists():
             return
         stored = _by_key(read_sweep(self._folder))
@@ -142,7 +142,7 @@ def _wait(process: subprocess.Popen[bytes], folder: Path, phase: str, before: tu
 
 
 def _state(folder: Path) -> tuple[int, int]:
-    """How often a sweep has come to its episodes, and how many parts it has stored."""
+    """Count a sweep's runs that reached their episodes, and the parts that it has stored."""
     record = folder / "sweep.json"
     runs = record.read_text(encoding="utf-8").count('"provenance"') if record.exists() else 0
     return runs, len(list((folder / "episodes").glob("*.parquet")))

@@ -23,7 +23,7 @@ from documentation.blocks import Block, blocks, commands, mentions, script
 from documentation.figures import FIGURES
 from documentation.notebooks import NOTEBOOKS, notebook
 from documentation.pages import ROOT, generated
-from documentation.plant import ARM, modelled, simulate
+from documentation.plant import ARM, modeled, simulate
 from nbclient import NotebookClient
 
 from artde_gym.cli import app
@@ -262,6 +262,6 @@ def test_an_arm_under_its_exact_model_obeys_the_designed_error():
     """Computed torque leaves no error but that of a torque held for a sampling period: the plant is what it says."""
     gains = ComputedTorqueGains(25.0, 10.0)
     arm = dataclasses.replace(ARM, load=0.0, load_weight=0.0, push=0.0)
-    coarse, fine = (np.abs(simulate(modelled(arm), gains, arm, period).e).max() for period in (0.004, 0.001))
+    coarse, fine = (np.abs(simulate(modeled(arm), gains, arm, period).e).max() for period in (0.004, 0.001))
     assert fine < 5e-4
     assert coarse / fine == pytest.approx(4.0, rel=0.1)

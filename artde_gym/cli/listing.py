@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from artde_gym.cli.arguments import names
-from artde_gym.cli.catalogue import TOPICS, Entries
+from artde_gym.cli.catalog import TOPICS, Entries
 from artde_gym.cli.display import terminal
 from artde_gym.errors import UnknownNameError, suggest_names
 

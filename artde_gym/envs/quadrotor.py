@@ -37,8 +37,8 @@ from artde_gym.sim.rotation import matrix
 TIME_STEP = 0.001  # s, of the physics
 STEPS = 5  # physics steps from one grid point to the next
 
-CENTRE: Vector = (0.0, 0.0, 0.6)  # m, of the path
-CAMERA = Camera(CENTRE, distance=3.0, yaw_deg=35.0, pitch_deg=24.0)
+CENTER: Vector = (0.0, 0.0, 0.6)  # m, of the path
+CAMERA = Camera(CENTER, distance=3.0, yaw_deg=35.0, pitch_deg=24.0)
 SHARE, LEEWAY = 0.5, 0.6  # of the vehicle's way from the center; m, that it may be off the picture's middle
 
 _NOTHING = (0.0, 0.0, 0.0)
@@ -184,7 +184,7 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
         step = self.elapsed
         pushes = self._schedule.acting(step)
         path = self._plan[:, :3]
-        return self.view.picture(step * TIME_STEP, CENTRE, pushes, self._sampled, path=path, over=self._over)
+        return self.view.picture(step * TIME_STEP, CENTER, pushes, self._sampled, path=path, over=self._over)
 
     def close(self) -> None:
         self._engine.close()

@@ -103,11 +103,11 @@ def run_plan(plan: Plan, out: str | Path | None = None, on_progress: Callable[[U
     try:
         for task, results in runs:
             progress.ended(task, results)
-            labelled = [({**labels_of(task, i), **result.row}, result.traces) for i, result in enumerate(results)]
+            labeled = [({**labels_of(task, i), **result.row}, result.traces) for i, result in enumerate(results)]
             if store is None:
-                rows += [row for row, _ in labelled]
+                rows += [row for row, _ in labeled]
             else:
-                store.add(labelled)
+                store.add(labeled)
     except KeyboardInterrupt:
         complete = False
     finally:

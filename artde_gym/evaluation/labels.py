@@ -13,7 +13,7 @@ from artde_gym.registration import ControllerSpec, registered_controllers
 _LIST = "a list of names or policies, at least one"
 
 
-def labelled(controllers: Any) -> dict[str, str | Policy]:
+def labeled(controllers: Any) -> dict[str, str | Policy]:
     """Give each controller the name under which it is listed.
 
     Raises:
@@ -46,7 +46,7 @@ def named_controllers(controllers: Any) -> dict[str, Policy | ControllerSpec]:
     """
     known = registered_controllers()
     named: dict[str, Policy | ControllerSpec] = {}
-    for label, item in labelled(controllers).items():
+    for label, item in labeled(controllers).items():
         if isinstance(item, str):
             if item not in known:
                 raise UnknownNameError("controller", item, suggest_names(item, known))

@@ -1,6 +1,6 @@
 """Rigid-body algebra of a `RobotSpec` in plain NumPy, batched over leading axes.
 
-A floating-base tree with generalised velocity v = [v_base; w_base; qd], all base quantities in world axes at the base
+A floating-base tree with generalized velocity v = [v_base; w_base; qd], all base quantities in world axes at the base
 link's origin:
 
     M(q) dv/dt + h(q, v) = [wrench on the base; tau]
@@ -117,7 +117,7 @@ class RigidBodyTree:
         base_acceleration: Array | None = None,
         rot_base_to_world: Array | None = None,
     ) -> Array:
-        """Generalised force that produces a motion, (..., 6 + n): [force, moment on the base; joint torques].
+        """Generalized force that produces a motion, (..., 6 + n): [force, moment on the base; joint torques].
 
         `base_velocity` and `base_acceleration` are (..., 6), [linear; angular], the linear acceleration being that of
         the base origin (not the spatial one). Zero where left out.

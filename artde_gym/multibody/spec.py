@@ -15,7 +15,7 @@ import numpy as np
 from artde_gym.errors import RobotError
 
 Vector = tuple[float, float, float]
-Colour = tuple[float, float, float, float]
+Color = tuple[float, float, float, float]
 
 ROTOR_MASS = 1e-6
 """Mass (kg) of a rotor link: engines need one above zero; its parent link gives it away."""
@@ -23,11 +23,11 @@ ROTOR_MASS = 1e-6
 
 @dataclasses.dataclass(frozen=True)
 class Box:
-    """A box of side lengths `size` (m) centred at `center` in its link's frame."""
+    """A box of side lengths `size` (m) centered at `center` in its link's frame."""
 
     size: Vector
     center: Vector
-    color: Colour = (0.62, 0.65, 0.70, 1.0)
+    color: Color = (0.62, 0.65, 0.70, 1.0)
 
 
 @dataclasses.dataclass(frozen=True)

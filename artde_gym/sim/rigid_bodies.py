@@ -3,7 +3,7 @@
 Components lie along the first axes and bodies along the last one, (3, n), and all arithmetic is elementwise, so that
 what happens to a body does not depend on how many others there are.
 
-A step of h is a drift of h/2, a kick of h with forces that belong to the middle of it, and a drift of h/2; neighbouring
+A step of h is a drift of h/2, a kick of h with forces that belong to the middle of it, and a drift of h/2; neighboring
 drifts may be made one. The error of this splitting is of second order:
 
 drift h:   p <- p + h v,   q <- q (1, w / |w| tan(h |w| / 2)) / norm

@@ -1,1 +1,1 @@
-"""How the robots of this project are driven, one module each."""
+"""Drives of the project's own robots, one module each."""

@@ -1,4 +1,4 @@
-"""How Ojas, the biped, is driven: one law on all joints."""
+"""Drive of Ojas, the biped: one law on all joints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the Q450, the quadrotor, is driven: a cascade of two laws."""
+"""Drive of the Q450, the quadrotor: a cascade of two laws."""
 
 from __future__ import annotations
 

@@ -112,7 +112,7 @@ def artde(
 def _adapt(
     gains: ArtdeGains, state: ArtdeState, s: Array, s_squared: Array, xi: Array, period: float
 ) -> tuple[Array, Array]:
-    """The gains for the next sample."""
+    """Return the gains for the next sample."""
     weight = np.sqrt(s_squared)
     if gains.growth == "midpoint":
         before = inner(state.s, state.s)

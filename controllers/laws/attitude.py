@@ -31,7 +31,7 @@ class Heading(NamedTuple):
 
 
 def heading(yaw: Array, rate: Array) -> Heading:
-    """The heading of a yaw angle (rad) that turns at `rate` (rad/s)."""
+    """Return the heading of a yaw angle (rad) that turns at `rate` (rad/s)."""
     return Heading(np.cos(yaw), np.sin(yaw), rate)
 
 
@@ -46,7 +46,7 @@ def attitude_error(axes: Axes, axes_ref: Axes) -> Vector:
 
 
 def desired_axes(force: Vector, towards: Heading) -> Axes:
-    """R_d: z along `force` (N, world), x = y_A x z normalised, y = z x x (Dantu 2023, equation 3.16).
+    """R_d: z along `force` (N, world), x = y_A x z normalized, y = z x x (Dantu 2023, equation 3.16).
 
     The force must not vanish, nor be parallel to the heading's y axis.
     """

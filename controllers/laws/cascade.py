@@ -67,7 +67,7 @@ class QuadrotorInput(NamedTuple):
         position_ref, velocity_ref, acceleration_ref, jerk_ref: (..., 3), world axes.
         yaw_ref, yaw_rate_ref: (...) in rad and rad/s.
         thrust_applied: u1 (...) (N), mean over the period before.
-        torque_applied: [u2, u3, u4] (..., 3) (Nm), likewise.
+        torque_applied: [u2, u3, u4] (..., 3) (Nm), mean over the period before.
         turning_ref: added to the attitude's reference acceleration (..., 3) (rad/s^2), body axes; None for nothing.
     """
 
@@ -129,7 +129,7 @@ class CascadeGains:
 
 
 class CascadeState(NamedTuple):
-    """What one sample leaves for the next; the body's and the desired axes are those of the sample itself.
+    """State between two samples; the body's and the desired axes are those of the sample itself.
 
     Attributes:
         position, attitude: of the two laws.
@@ -208,7 +208,7 @@ def _position_signals(flight: QuadrotorInput, applied: Array) -> JointInput:
 def _command(
     gains: CascadeGains, before: FilterState, force: Array, flight: QuadrotorInput, period: float
 ) -> tuple[FilterState, Axes, Vector, Vector]:
-    """The command for the next sample; R_d, w_d and alpha_d of this one."""
+    """Compute the command for the next sample; R_d, w_d and alpha_d of this one."""
     if gains.command == "filtered":  # the difference to the next sample, which is known already
         now, distance = before, period
         other = command = second_order(before, force, gains.command_rate, 1.0, period)
@@ -221,7 +221,7 @@ def _command(
 
 
 def _reference_command(gains: CascadeGains, force: Array, flight: QuadrotorInput) -> FilterState:
-    """A force at the rate that the reference's jerk takes."""
+    """Return a force at the rate that the reference's jerk takes."""
     return FilterState(force, times(gains.position.m_bar, flight.jerk_ref))
 
 
@@ -236,7 +236,7 @@ def _attitude_command(command: FilterState, flight: QuadrotorInput, distance: fl
 def _attitude_signals(
     gains: CascadeGains, flight: QuadrotorInput, axes_ref: Axes, rates_ref: Vector, turning: Vector
 ) -> JointInput:
-    """What the attitude law sees, see the top; `turning` is alpha_d."""
+    """Return the attitude law's signals, see the top; `turning` is alpha_d."""
     carried = _carried(flight, axes_ref, rates_ref)
     q, qd_ref = _attitude_feedback(gains, flight, axes_ref, rates_ref, carried)
     turning = _carried(flight, axes_ref, turning)
@@ -265,7 +265,7 @@ def _carried(flight: QuadrotorInput, axes_ref: Axes, a: Vector) -> Vector:
 
 
 def _within_reach(gains: CascadeGains, force: Vector) -> Vector:
-    """The force with its vertical part clamped, then its horizontal part shortened to the largest tilt."""
+    """Clamp the vertical part of a force, then shorten its horizontal part to the largest tilt."""
     x, y, lift = force
     lift = np.minimum(np.maximum(lift, gains.lift_min), gains.lift_max)
     allowed = math.tan(math.radians(gains.tilt_max_deg)) * lift

@@ -42,7 +42,7 @@ class PidState(NamedTuple):
 
 
 def identity_gains(gains: TdeGains, period: float) -> PidGains:
-    """The PID that equals TDE with scalar or diagonal `gains` at the sampling `period` (s).
+    """Return the PID that equals TDE with scalar or diagonal `gains` at the sampling `period` (s).
 
     Raises:
         GainError: for a full matrix m_bar.

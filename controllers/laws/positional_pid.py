@@ -33,8 +33,8 @@ class PositionalPidGains:
 
     Attributes:
         m_bar: nominal inertia (kg, kg m^2), a number or one an axis.
-        k_p: stiffness (1/s^2), likewise.
-        k_d: damping (1/s), likewise.
+        k_p: stiffness (1/s^2), a number or one an axis.
+        k_d: damping (1/s), a number or one an axis.
         k_i: integral gain (1/s^3); 0 keeps the integral where it starts.
         integral_limit: largest size of each component of the integral (m/s^2, rad/s^2).
     """

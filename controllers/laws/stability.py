@@ -40,7 +40,7 @@ def tde_eigenvalues(inertia: NDArray[np.floating[Any]], m_bar: Inertia) -> NDArr
 
 
 def tde_is_valid(inertia: NDArray[np.floating[Any]], m_bar: Inertia) -> NDArray[np.bool_]:
-    """Whether all eigenvalues lie inside (0, 2), (...)."""
+    """Return True if all eigenvalues lie inside (0, 2), (...)."""
     eigenvalues = tde_eigenvalues(inertia, m_bar)
     return np.all((eigenvalues > 0) & (eigenvalues < 2), axis=-1)
 

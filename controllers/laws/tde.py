@@ -74,7 +74,7 @@ class TdeGains:
 
 
 class TdeState(NamedTuple):
-    """What one sample leaves for the next, each (..., n): qd, u, and sigma for those who look at it."""
+    """State between two samples, each (..., n): qd, u, and sigma for diagnostics."""
 
     qd: Array
     u: Array
@@ -98,7 +98,7 @@ def tde(
 
 
 def time_delay(m_bar: Inertia, state: TdeState, signals: JointInput, u: Array, period: float) -> tuple[Array, TdeState]:
-    """The force that lets the acceleration be `u` (..., n), as far as the dynamics are what they were a sample ago."""
+    """Return the force that makes the acceleration `u` (..., n) if the dynamics are those of one sample ago."""
     a = (signals.qd - state.qd) / period
     tau = signals.tau_applied + inertia_times(m_bar, u - a)
     return tau, TdeState(signals.qd, u, state.u - a)

@@ -1,4 +1,4 @@
-"""What all tracking laws share: the signals of one sample, the errors and the sliding variable."""
+"""Common parts of all tracking laws: the signals of one sample, the errors and the sliding variable."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Gain: TypeAlias = "float | Sequence[float]"
 class JointInput(NamedTuple):
     """One sample of n joints, each (..., n), in rad, rad/s, rad/s^2 and Nm (or m, ..., N).
 
-    `tau_applied` is the generalised force that really acted since the sample before.
+    `tau_applied` is the generalized force that really acted since the sample before.
     """
 
     q: Array
@@ -32,7 +32,7 @@ class JointInput(NamedTuple):
 
 
 LawState: TypeAlias = "tuple[Any, ...]"
-"""What a law remembers: a named tuple of arrays, or of such tuples."""
+"""State of a law: a named tuple of arrays, or of such tuples."""
 
 
 class Law(NamedTuple):
@@ -85,7 +85,7 @@ def inner(v: Array, w: Array) -> Array:
 
 
 def components(v: Array) -> tuple[Array, Array, Array]:
-    """The components of an array (..., 3)."""
+    """Return the components of an array (..., 3)."""
     return v[..., 0][()], v[..., 1][()], v[..., 2][()]  # numbers of one vector: ten times as fast as 0-d arrays
 
 
@@ -121,7 +121,7 @@ def check_non_negative(field: str, value: float) -> None:
 
 
 def is_finite(value: object) -> TypeGuard[float]:
-    """Whether `value` is a number at all, and a finite one."""
+    """Return True if `value` is a finite number, and no truth value."""
     return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
 
 

@@ -23,17 +23,17 @@ def dot(a: Vector, b: Vector) -> Array:
 
 
 def cross(a: Vector, b: Vector) -> Vector:
-    """a x b."""
+    """Compute a x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 def plus(a: Vector, b: Vector) -> Vector:
-    """a + b."""
+    """Compute a + b."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 def minus(a: Vector, b: Vector) -> Vector:
-    """a - b."""
+    """Compute a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 

@@ -29,7 +29,7 @@ def estimate_init(signals: JointInput, period: float) -> EstimateState:
 def estimate(
     cutoff_hz: float, state: EstimateState, signals: JointInput, period: float
 ) -> tuple[JointInput, EstimateState]:
-    """The signals with the velocity replaced by its estimate."""
+    """Replace the velocity by its estimate."""
     keep = math.exp(-2 * math.pi * cutoff_hz * period)
     qd = keep * state.qd + ((1 - keep) / period) * (signals.q - state.q)
     return signals._replace(qd=qd), EstimateState(signals.q, qd)

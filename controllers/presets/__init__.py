@@ -56,10 +56,10 @@ def preset_gains(robot: str, law: str, preset: str | None, joints: int, override
 
 
 def gain_ranges(robot: str, law: str, preset: str | None) -> dict[str, GainRange]:
-    """Where tuning may look for the gains of a law, from a preset on.
+    """Return the ranges in which tuning searches a law's gains, from a preset on.
 
     Raises:
-        UnknownNameError: as `preset_gains`, or for a law whose gains nobody tunes.
+        UnknownNameError: as `preset_gains`, or for a law without tuning ranges.
     """
     gains = named_gains(_preset(robot, law, preset).gains)
     known = DRIVES[robot].ranges
@@ -111,7 +111,7 @@ def named_gains(gains: Any) -> dict[str, Any]:
 
 
 def _replaced(gains: Any, overrides: dict[str, Any]) -> Any:
-    """The gains with some replaced, by the names of `_flat`."""
+    """Replace some of the gains, by the names of `_flat`."""
     changes: dict[str, Any] = {}
     for field in dataclasses.fields(gains):
         if field.name in LOOPS:

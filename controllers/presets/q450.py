@@ -37,7 +37,7 @@ def _cascade(position: Any, attitude: Any, **options: Any) -> CascadeGains:
 
 
 def _both(law: Any, **rest: Any) -> CascadeGains:
-    """The thesis' gains, which are the same in both loops but for the nominal inertia."""
+    """Return the thesis' gains, which are the same in both loops but for the nominal inertia."""
     return _cascade(law(_M_BAR, _K_P, _K_D, **rest), law(_J_BAR, _K_P, _K_D, **rest))
 
 

@@ -32,7 +32,7 @@ _MOVING = {"inertia": "kg", "length": "m"}
 
 
 def unit_of(gain: str) -> str:
-    """Unit of a gain, named as an override names it; "" for a word, and where Q = I mixes units (SI throughout)."""
+    """Return the unit of a gain by its override's name; "" for a word, and where Q = I mixes units (SI throughout)."""
     name, coordinate = gain, _TURNING
     if gain.endswith(("_p", "_q")) and gain not in _UNITS:
         name, coordinate = gain[:-2], _MOVING if gain.endswith("_p") else _TURNING

@@ -1,1 +1,1 @@
-"""What `mkdocs.yml` builds the site with: pages out of docstrings, figures out of laws, notebooks out of tutorials."""
+"""Parts of the documentation's build: pages from docstrings, figures from laws, notebooks from tutorials."""

@@ -23,7 +23,7 @@ class Block(NamedTuple):
 
 
 def blocks(markdown: str) -> list[Block]:
-    """The parts of a page in their order."""
+    """Return the parts of a page in their order."""
     found, end = [], 0
     for fence in FENCE.finditer(markdown):
         prose = markdown[end : fence.start()]
@@ -46,12 +46,12 @@ def script(parts: list[Block]) -> str:
 
 
 def commands(markdown: str) -> list[list[str]]:
-    """The words after `artde-gym` of its calls in shell blocks."""
+    """Return the words after `artde-gym` of its calls in shell blocks."""
     return _calls(line for part in blocks(markdown) if part.language == "sh" for line in _lines(part.text))
 
 
 def mentions(markdown: str) -> list[list[str]]:
-    """Those of its calls in indented lines and code spans, which may leave out what is clear."""
+    """Return the words of its calls in indented lines and code spans, which may be abbreviated."""
     prose = [part.text for part in blocks(markdown) if part.language == "markdown"]
     indented = [line.strip() for text in prose for line in _lines(text) if line[:4] == "    "]
     spans = [span.replace("\n", " ") for text in prose for span in re.findall(r"`([^`]+)`", text)]

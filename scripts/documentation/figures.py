@@ -27,7 +27,7 @@ from controllers.laws.tde import ConstantGains, equivalent_gains
 from controllers.laws.tracking import JointInput, components
 from controllers.laws.vectors import joined
 from documentation.architecture import rooms
-from documentation.plant import ARM, DURATION, LIFT, LOADED, PUSHED, Plant, Run, modelled, simulate
+from documentation.plant import ARM, DURATION, LIFT, LOADED, PUSHED, Plant, Run, modeled, simulate
 
 ARM_PERIOD, LIFT_PERIOD = 0.004, 0.015  # s
 NOISE = 0.02  # m/s, of a measured velocity
@@ -163,7 +163,7 @@ def indi() -> str:
 
 def computed() -> str:
     gains = ComputedTorqueGains(25.0, 10.0)
-    runs = {"computed-torque": simulate(modelled(ARM), gains, ARM, ARM_PERIOD), "tde": arm("tde")}
+    runs = {"computed-torque": simulate(modeled(ARM), gains, ARM, ARM_PERIOD), "tde": arm("tde")}
     charts = {"error": errors(runs, log=True)}
     before = {name: _rms(run, run.time < LOADED) for name, run in runs.items()}
     after = {name: _rms(run, run.time >= LOADED) for name, run in runs.items()}
@@ -175,7 +175,7 @@ def computed() -> str:
 
 
 def geometric() -> str:
-    """A rigid body turns back from a tilt about a skew axis."""
+    """Turn a rigid body back from a tilt about a skew axis."""
     gains = DRIVES["q450"].presets["geometric", "hand"].gains.attitude
     period, count = LIFT_PERIOD, round(2.0 / LIFT_PERIOD)
     time = period * np.arange(count)
@@ -237,13 +237,13 @@ def gains_of(robot: str, law: str, preset: str | None = None) -> Any:
 
 @functools.cache
 def arm(law: str, *, preset: str | None = None, period: float = ARM_PERIOD) -> Run:
-    """The arm at the biped's gains."""
+    """Simulate the arm at the biped's gains."""
     return _run(law, gains_of("ojas", law, preset), ARM, period)
 
 
 @functools.cache
 def lift(law: str, gains: str | None = None, preset: str | None = None, noise: float = 0.0) -> Run:
-    """The vertical axis at the gains of the quadrotor's position loop, those of the law's own name by default."""
+    """Simulate the vertical axis at the position loop's gains, by default those of the law's own name."""
     return _run(law, gains_of("q450", gains or law, preset).position, LIFT, LIFT_PERIOD, noise)
 
 
@@ -272,7 +272,7 @@ def errors(runs: Mapping[str, Run], *, log: bool = False) -> str:
 
 
 def inside(run: Run, name: str) -> Signal:
-    """A number, or the size of the one component, that the law remembers."""
+    """Return a scalar of the law's state, or the magnitude of its one component."""
     return run.time, np.abs(run.inside[name]).reshape(len(run.time))
 
 

@@ -25,7 +25,7 @@ FORMULA = re.compile(
 
 
 def mathml(page: str) -> str:
-    """A page's HTML with its formulas, as pymdownx.arithmatex leaves them, turned into MathML."""
+    """Turn the formulas that pymdownx.arithmatex leaves in a page's HTML into MathML."""
 
     def replace(found: re.Match[str]) -> str:
         kind = str(found.lastgroup)
@@ -35,7 +35,7 @@ def mathml(page: str) -> str:
 
 
 def symbols(page: str) -> set[int]:
-    """The characters in the MathML of a page."""
+    """Return the characters in the MathML of a page."""
     formulas = re.findall(r"<math .*?</math>", page, re.DOTALL)
     return {ord(character) for formula in formulas for character in html.unescape(re.sub(r"<.*?>", "", formula))}
 

@@ -21,7 +21,7 @@ COMMENT = re.compile(r"<!--.*?-->\n?", re.DOTALL)
 
 
 def notebook(page: Path) -> str:
-    """The notebook of a page, as JSON: prose, Python cells, shell cells; links to other pages are plain words."""
+    """Return the notebook of a page as JSON: prose, Python cells, shell cells; links to other pages are plain words."""
     cells = [cell for part in blocks(page.read_text(encoding="utf-8")) if (cell := _cell(part)) is not None]
     for number, cell in enumerate(cells):
         cell["id"] = f"cell-{number}"  # the same page gives the same file

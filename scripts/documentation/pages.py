@@ -48,12 +48,12 @@ def generated() -> dict[str, str]:
 
 
 def cards() -> list[Path]:
-    """The model cards of the policies that are shipped."""
+    """Return the model cards of the shipped policies."""
     return sorted((ROOT / "baselines/policies").glob("*/README.md"))
 
 
 def environment(env_id: str) -> str:
-    """The page of an environment: its docstring, then what the registries know of it."""
+    """Return an environment's page: its docstring, then its entries in the registries."""
     spec, robot = gym.spec(env_id), robot_of(env_id)
     page = _page(load_env_creator(str(spec.entry_point)))
     shown = [f"<!-- replay: {OF_ENVIRONMENTS[env_id]} -->"] if env_id in OF_ENVIRONMENTS else []
@@ -81,7 +81,7 @@ def _page(documented: Any) -> str:
 
 
 def _sections(page: str) -> list[str]:
-    """What stands before the first head, and each section with its head."""
+    """Split a text into the part before the first heading and each section with its heading."""
     return [part.strip() for part in re.split(r"^(?=## )", page, flags=re.MULTILINE)]
 
 

@@ -99,8 +99,8 @@ def simulate(law: Law, gains: Any, plant: Plant, period: float, *, duration: flo
     return Run(plant, time, np.array(errors), np.array(forces), names)
 
 
-def modelled(plant: Plant) -> Law:
-    """Computed torque with the plant's own equation, but for the load, which it does not know."""
+def modeled(plant: Plant) -> Law:
+    """Compute torque by the plant's own equation, without the load, which it does not know."""
 
     def start(_gains: Any, _signals: JointInput, _period: float) -> Nothing:
         return Nothing()

@@ -160,8 +160,8 @@ class Mechanics:
         """[linear; angular about the world's origin], (6,)."""
         state, (q, qd) = self.engine.state(), self.joints()
         matrix = self.tree.mass_matrix(q, rotation(state.quat_xyzw))
-        generalised = matrix[:6] @ np.concatenate([state.velocity, state.angular_velocity, qd])
-        return np.concatenate([generalised[:3], generalised[3:] + np.cross(state.position, generalised[:3])])
+        generalized = matrix[:6] @ np.concatenate([state.velocity, state.angular_velocity, qd])
+        return np.concatenate([generalized[:3], generalized[3:] + np.cross(state.position, generalized[:3])])
 
     def site(self, name: str) -> np.ndarray:
         """World position of a site."""
@@ -192,7 +192,7 @@ def flying(engine_name: EngineName, spec: RobotSpec, gravity: float = 0.0) -> En
     return engine
 
 
-def realise(disturbances: dict[str, Any], **words: Any) -> dict[str, Any]:
+def realize(disturbances: dict[str, Any], **words: Any) -> dict[str, Any]:
     return Disturbances.parse(disturbances, words.get("sites", ()), ojas().actuated).sample(np.random.default_rng(0))
 
 
@@ -377,7 +377,7 @@ def pulses(loads: list[float], **entry: Any) -> np.ndarray:
     """Force on the left foot at each step of a sequence of its loads, as planned; the right foot stands."""
     given = entry if "share" in entry else {"magnitude": 60.0, **entry}
     pulse = GrfPulses(1, np.array([0.0 if load == 0 else 0.5 for load in loads]), DT)
-    pulse.begin(0, realise({"grf_pulse": given})["grf_pulse"], ojas())
+    pulse.begin(0, realize({"grf_pulse": given})["grf_pulse"], ojas())
     forces = np.array([pulse.forces(np.array([[load, 50.0]]), np.array([step]))[0] for step, load in enumerate(loads)])
     assert not forces[:, 1].any()
     return forces[:, 0]
@@ -526,8 +526,8 @@ def test_sensor_noise_is_white_and_where_it_belongs(only: str | None) -> None:
             continue
         assert abs(error.mean()) < 4 * noise[name] / math.sqrt(error.size)
         assert error.std() == pytest.approx(noise[name], rel=4 / math.sqrt(2 * error.size))
-        neighbour = (error[1:] * error[:-1]).mean() / noise[name] ** 2
-        assert abs(neighbour) < 4 / math.sqrt(error.size)
+        neighbor = (error[1:] * error[:-1]).mean() / noise[name] ** 2
+        assert abs(neighbor) < 4 / math.sqrt(error.size)
     for field in set(true.fields) - set(MEASURED.values()):
         np.testing.assert_array_equal(noisy.fields[field], true.fields[field])
 
@@ -664,7 +664,7 @@ def test_losses_start_on_time_wherever_they_fall() -> None:
     joints, one = ojas().actuated, np.ones(12)
     for step in (1, 9, 1001, 4097, 28001, 57999):
         losses = {"actuator_effectiveness": {"joint": "left_knee", "start": step / 1000}}
-        actuation = Actuation(realise(losses), joints, DT)
+        actuation = Actuation(realize(losses), joints, DT)
         actuation.start(one)
         acting = [actuation.advance(actuation.target(one), k)[KNEE] for k in range(step - 2, step + 2)]
         assert acting == [1.0, 1.0, 0.0, 0.0]

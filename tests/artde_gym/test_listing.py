@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 import controllers
 from artde_gym.cli import app
-from artde_gym.cli.catalogue import TOPICS
+from artde_gym.cli.catalog import TOPICS
 from artde_gym.disturbances import DISTURBANCES
 from artde_gym.registration import registered_controllers
 from artde_gym.scenarios import SCENARIOS

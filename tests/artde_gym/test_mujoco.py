@@ -26,7 +26,7 @@ DT = 0.001
 
 
 class Coordinates:
-    """Between MuJoCo's generalised velocities and ours: the base's spin in world axes, joints in the tree's order."""
+    """Between MuJoCo's generalized velocities and ours: the base's spin in world axes, joints in the tree's order."""
 
     def __init__(self, engine: MujocoEngine) -> None:
         self.engine, self.model, self.data = engine, engine._model, engine._data

@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull
 
 from artde_gym.errors import OptionError
 from artde_gym.multibody.dynamics import GRAVITY, RigidBodyTree
-from artde_gym.robots.ojas.model import ANKLE_HEIGHT, FOOT_CENTRE_AHEAD, FOOT_SIZE, HIP_OFFSET, ojas
+from artde_gym.robots.ojas.model import ANKLE_HEIGHT, FOOT_CENTER_AHEAD, FOOT_SIZE, HIP_OFFSET, ojas
 from artde_gym.robots.ojas.walking import STAND, WalkingPattern, hip_height_above_ankle, walking_pattern
 
 PERIOD, DURATION, STEPS = 0.001, 58.0, 54
@@ -44,7 +44,7 @@ def central(values: np.ndarray, order: int) -> np.ndarray:
 def corners(ankle: np.ndarray) -> np.ndarray:
     length, width, _ = FOOT_SIZE
     signs = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])
-    return ankle[:2] + [FOOT_CENTRE_AHEAD, 0.0] + 0.5 * signs * [length, width]
+    return ankle[:2] + [FOOT_CENTER_AHEAD, 0.0] + 0.5 * signs * [length, width]
 
 
 def test_the_foot_is_that_of_the_robot():
@@ -77,7 +77,7 @@ def test_base_keeps_its_height_and_begins_and_ends_over_the_feet(walk, speed):
     tree = RigidBodyTree(ojas("none"))
     for k in (0, -1):
         center = walk.base[k] + tree.center_of_mass(walk.q[k])
-        middle = walk.feet[k].mean(axis=0) + np.array([FOOT_CENTRE_AHEAD, 0.0, 0.0])
+        middle = walk.feet[k].mean(axis=0) + np.array([FOOT_CENTER_AHEAD, 0.0, 0.0])
         np.testing.assert_allclose(center[:2], middle[:2], atol=1e-5)
 
 

@@ -23,8 +23,8 @@ SHANK = 0.20  # m, knee to ankle
 ANKLE_HEIGHT = 0.05  # m, ankle to sole
 HIP_OFFSET = 0.065  # m, hip to the middle of the hip line
 FOOT_SIZE: Vector = (0.20, 0.11, 0.02)
-FOOT_CENTRE_AHEAD = 0.02  # m, middle of the foot ahead of the ankle
-TORSO_CENTRE: Vector = (0.0, 0.0, 0.16)
+FOOT_CENTER_AHEAD = 0.02  # m, middle of the foot ahead of the ankle
+TORSO_CENTER: Vector = (0.0, 0.0, 0.16)
 TORQUE_LIMIT = 40.0  # Nm
 ARMATURE = 0.045  # kg m^2, of a rotor and its gear, reflected to each leg joint
 GEAR_RATIO = 10.0
@@ -75,8 +75,8 @@ def ojas(actuator_inertia: ActuatorInertia = "rotor", *, arms: Literal["fixed", 
         ),
     )
     torso_mass = TOTAL_MASS - math.fsum(link.mass for link in (*links, head))
-    torso = box_link("torso", torso_mass, (0.12, 0.20, 0.28), TORSO_CENTRE)
-    torso = dataclasses.replace(torso, visuals=(Box((0.12, 0.20, 0.28), TORSO_CENTRE, _BLUE),))
+    torso = box_link("torso", torso_mass, (0.12, 0.20, 0.28), TORSO_CENTER)
+    torso = dataclasses.replace(torso, visuals=(Box((0.12, 0.20, 0.28), TORSO_CENTER, _BLUE),))
     legs = tuple(f"{side}_{joint}" for side in SIDES for joint in LEG_JOINTS)
     bare = RobotSpec(
         name="ojas",
@@ -87,11 +87,11 @@ def ojas(actuator_inertia: ActuatorInertia = "rotor", *, arms: Literal["fixed", 
         armature=(ARMATURE,) * len(legs),
         gear_ratio=GEAR_RATIO,
         sites=(
-            ("torso", "torso", TORSO_CENTRE),
+            ("torso", "torso", TORSO_CENTER),
             ("chest", "torso", (0.06, 0.0, 0.22)),
             ("left_arm", "left_shoulder_yaw", (0.0, 0.0, -0.06)),
             ("right_arm", "right_shoulder_yaw", (0.0, 0.0, -0.06)),
-            *((f"{side}_foot", f"{side}_ankle_roll", (FOOT_CENTRE_AHEAD, 0.0, -ANKLE_HEIGHT)) for side in SIDES),
+            *((f"{side}_foot", f"{side}_ankle_roll", (FOOT_CENTER_AHEAD, 0.0, -ANKLE_HEIGHT)) for side in SIDES),
         ),
     ).merged()
     if actuator_inertia == "rotor":
@@ -108,7 +108,7 @@ def _leg(side: str) -> tuple[Link, ...]:
     name = {joint: f"{side}_{joint}" for joint in LEG_JOINTS}
     thigh: Vector = (0.08, 0.07, THIGH)
     shank: Vector = (0.07, 0.06, SHANK)
-    foot_center: Vector = (FOOT_CENTRE_AHEAD, 0.0, -ANKLE_HEIGHT + FOOT_SIZE[2] / 2)
+    foot_center: Vector = (FOOT_CENTER_AHEAD, 0.0, -ANKLE_HEIGHT + FOOT_SIZE[2] / 2)
     foot = box_link(name["ankle_roll"], 0.25, FOOT_SIZE, foot_center, name["ankle_pitch"], axis=_X, collides=True)
     return (
         box_link(name["hip_yaw"], 0.20, (0.06, 0.06, 0.06), (0.0, 0.0, 0.0), "torso", (0.0, y, 0.0), _Z),

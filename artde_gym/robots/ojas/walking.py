@@ -167,7 +167,7 @@ class _Gait:
         step, _ = self._progress(time)
         left, right = (self.foothold(np.array(foot), step) for foot in (0, 1))
         load = self.load_left(time)
-        x = load * left + (1 - load) * right + robot.FOOT_CENTRE_AHEAD
+        x = load * left + (1 - load) * right + robot.FOOT_CENTER_AHEAD
         y = (2 * load - 1) * robot.HIP_OFFSET
         return np.stack([x, y], axis=-1)
 

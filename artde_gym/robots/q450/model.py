@@ -2,7 +2,7 @@
 
 The thesis gives the frame, 1.4 kg without computer and gripper, and the gripper's 0.03 kg; the rest is ours
 (`docs/deviations.md`). Body frame: at the center of mass; x forward, y left, z up along the thrust. Four rotors in X
-configuration, counted counter-clockwise from the front left as seen from above; neighbours turn in opposite directions.
+configuration, counted counter-clockwise from the front left as seen from above; neighbors turn in opposite directions.
 """
 
 from __future__ import annotations

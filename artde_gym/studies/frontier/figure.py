@@ -16,7 +16,7 @@ WIDTH = 8.0  # inch
 CURVES, ROW = 3.9, 0.3  # inch, height of the upper part and of each controller's row in the lower one
 DPI = 150
 APART = 0.008  # of the range, between two controllers at one level
-GREY = "#555555"
+GRAY = "#555555"
 
 
 def draw(found: Frontier, file: BinaryIO) -> None:
@@ -65,13 +65,13 @@ def _bar(axes: Any, place: int, row: dict[Any, Any], look: Style, found: Frontie
 
 
 def _finish_upper(axes: Any, found: Frontier, count: int) -> None:
-    axes.axhline(found.survival, color=GREY, linewidth=1, linestyle=(0, (5, 3)), zorder=1)
+    axes.axhline(found.survival, color=GRAY, linewidth=1, linestyle=(0, (5, 3)), zorder=1)
     axes.annotate(
         f"{100 * found.survival:g} %",
         (1.01, found.survival),
         xycoords=("axes fraction", "data"),
         va="center",
-        color=GREY,
+        color=GRAY,
         annotation_clip=False,
     )
     axes.set_ylim(-0.03, 1.03)
@@ -82,7 +82,7 @@ def _finish_upper(axes: Any, found: Frontier, count: int) -> None:
     axes.spines[["top", "right"]].set_visible(False)
     episodes = "1 seeded episode" if count == 1 else f"{count} seeded episodes"
     note = f"{episodes} a level and controller; bars: 95 % interval; markers side by side are one level"
-    axes.set_title(note, fontsize=8.5, color=GREY, loc="left")
+    axes.set_title(note, fontsize=8.5, color=GRAY, loc="left")
 
 
 def _finish_lower(axes: Any, found: Frontier, shown: Mapping[str, Style]) -> None:
@@ -99,4 +99,4 @@ def _finish_lower(axes: Any, found: Frontier, shown: Mapping[str, Style]) -> Non
     title = (
         f"survived in at least {100 * found.survival:g} %; pale: between the last level survived and the first failed"
     )
-    axes.set_title(title, fontsize=8.5, color=GREY, loc="left")
+    axes.set_title(title, fontsize=8.5, color=GRAY, loc="left")

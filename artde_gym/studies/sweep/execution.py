@@ -172,7 +172,7 @@ def _check(plan: Design, points: Mapping[str, SweepCell], done: set[Key], on_pro
     """Build everything once, so that a bad cell shows before the first episode; cells with episodes have been tried."""
     begun = {cell for cell, _ in done}
     fresh = [(name, point) for name, point in points.items() if point.id not in begun]
-    fresh.sort(key=lambda item: _place(item[1]))  # neighbours share an environment
+    fresh.sort(key=lambda item: _place(item[1]))  # neighbors share an environment
     last, env = None, None
     for i, (name, point) in enumerate(fresh, start=1):
         if _place(point) != last:

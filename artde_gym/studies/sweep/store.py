@@ -5,7 +5,7 @@
     corrupt/                        files that were not as they had been written; their episodes are run again
     .lock                           held by the process that writes, see `artde_gym.evaluation.lock`
 
-Every file is written under another name, synchronised with the disk and renamed: it is there whole or not at all. An
+Every file is written under another name, synchronized with the disk and renamed: it is there whole or not at all. An
 episode is known by its cell (a hash of everything that decides about it) and its number, so that none is run twice;
 one process alone writes, so that none is stored twice. A part waits for more episodes for a second, later for a
 hundredth of the run's time so far, at most for half a minute: no more work is lost when the process is killed.

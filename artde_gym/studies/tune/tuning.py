@@ -35,7 +35,7 @@ from artde_gym.evaluation.environments import metrics_spec_of, single, with_engi
 from artde_gym.evaluation.evaluate import run_plan
 from artde_gym.evaluation.gains import policy_for
 from artde_gym.evaluation.identity import behind
-from artde_gym.evaluation.labels import labelled
+from artde_gym.evaluation.labels import labeled
 from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.plan import MOST_EPISODES, Plan
 from artde_gym.evaluation.result import Result
@@ -144,7 +144,7 @@ def tune(
 
 def _names(controllers: Any) -> list[str]:
     """Return the controllers, if they can be told from their tuned selves."""
-    names = labelled(controllers)
+    names = labeled(controllers)
     for name, item in names.items():
         if name != item:
             raise OptionError("controllers", item, "registered names: an object has its own gains")
