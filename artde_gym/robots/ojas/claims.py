@@ -1,4 +1,4 @@
-"""The thesis' claims of Ojas."""
+"""The thesis' claims about Ojas."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ _FALL = {"tde": True, "atde": True, "artde": False}
 _WALK = {"tde": False, "atde": False, "artde": False}
 
 CLAIMS: tuple[Claim, ...] = (
-    Claim("S1", "nobody falls", "nobody falls", falls("S1", _WALK)),
+    Claim("S1", "no controller falls", "no controller falls", falls("S1", _WALK)),
     *(
         Claim(
             "S1",
@@ -36,7 +36,7 @@ CLAIMS: tuple[Claim, ...] = (
         "<= 14 % (q2 of phase 3)",
         repeats("S3", "S2", "rmse_deg", JOINTS, 15.0),
     ),
-    Claim("S1-L4", "at 4 ms: nobody falls", "1 ms in the thesis", falls("S1-L4", _WALK)),
+    Claim("S1-L4", "at 4 ms: no controller falls", "1 ms in the thesis", falls("S1-L4", _WALK)),
     Claim("S2-L4", "at 4 ms: TDE and ATDE fall with the payload, ARTDE does not", "1 ms", falls("S2-L4", _FALL)),
     Claim("S3-L4", "at 4 ms: ARTDE survives both pushes", "1 ms in the thesis", falls("S3-L4", {"artde": False})),
     *(
