@@ -19,7 +19,7 @@ from artde_gym.errors import ActionError, ArtdeGymError, OptionError, UnknownArg
 Owner = TypeVar("Owner")
 Arguments = ParamSpec("Arguments")
 
-NUMERIC = "biufO"  # array kinds that can hold real numbers; objects are converted one by one
+NUMERIC_KINDS = "biufO"  # array kinds that can hold real numbers; objects are converted one by one
 
 NAME_BYTES = 200
 """Longest name within a file name: file systems allow 255 bytes, less a number, a suffix and an extension."""
@@ -101,7 +101,7 @@ def real_array(
     """
     try:
         given = np.asarray(value)
-        if given.dtype.kind not in NUMERIC:
+        if given.dtype.kind not in NUMERIC_KINDS:
             raise TypeError(f"values of type {given.dtype}")
         return np.array(given, dtype=dtype, order=order)
     except (

@@ -17,13 +17,13 @@ from artde_gym.sim.camera import Camera
 from artde_gym.sim.engine import State
 
 RATE = 30.0  # Hz, of polling the keys
-FORCE = 10.0  # N, initial force of a push unless the robot's kit sets one
-DURATION = 0.2  # s, of a push
-HARDER = 1.25  # factor of the force per key press
-SLOWER = 2.0  # factor of the speed per key press
-SPEEDS = (1 / 64, 4.0)  # slowest and fastest, simulated over real time
-VIEW = 0.03  # m, motion of the robot after which the view follows
-ARROW = 0.35  # m, length of a push's arrow in the window
+PUSH_FORCE = 10.0  # N, initial force of a push unless the robot's kit sets one
+PUSH_DURATION = 0.2  # s, of a push
+FORCE_FACTOR = 1.25  # per key press
+SPEED_FACTOR = 2.0  # per key press
+SPEED_RANGE = (1 / 64, 4.0)  # slowest and fastest, simulated over real time
+VIEW_SLACK = 0.03  # m, motion of the robot after which the view follows
+ARROW_LENGTH = 0.35  # m, of a push in the window
 
 DIRECTIONS: dict[str, Vector] = {
     "up": (1.0, 0.0, 0.0),
@@ -76,7 +76,7 @@ class Session:
         self._env, self._plant, self._policy, self._window, self._name = env, env.unwrapped, policy, window, name
         self._seed = seed
         self._sites: list[str] = [site for site, _, _ in self._plant.nominal_robot.sites]
-        self.site, self.force = ROBOTS[self._plant.robot_name].push or Push(self._sites[0], FORCE)
+        self.site, self.force = ROBOTS[self._plant.robot_name].push or Push(self._sites[0], PUSH_FORCE)
         self.speed, self.paused, self.leaving = 1.0, False, False
         self._actions: dict[str, Callable[[], object]] = {
             "d": self._plant.drop_payload,
@@ -84,11 +84,11 @@ class Session:
             "q": self._leave,
             "escape": self._leave,
             "space": self._pause,
-            ",": lambda: self._pace(1 / SLOWER),
-            ".": lambda: self._pace(SLOWER),
-            "+": lambda: self._strengthen(HARDER),
-            "=": lambda: self._strengthen(HARDER),
-            "-": lambda: self._strengthen(1 / HARDER),
+            ",": lambda: self._pace(1 / SPEED_FACTOR),
+            ".": lambda: self._pace(SPEED_FACTOR),
+            "+": lambda: self._strengthen(FORCE_FACTOR),
+            "=": lambda: self._strengthen(FORCE_FACTOR),
+            "-": lambda: self._strengthen(1 / FORCE_FACTOR),
         }
         self._seen, self._status = (math.inf, 0.0, 0.0), ""
         self._window.look(self._plant.view.camera)
@@ -159,10 +159,10 @@ class Session:
         engine = self._plant.engine
         self._window.show(engine.state(), engine.payload_position())
         place = engine.site(self._sites[0])
-        if math.dist(place, self._seen) > VIEW:
+        if math.dist(place, self._seen) > VIEW_SLACK:
             self._window.follow(place)
         status = self.status()
-        if math.dist(place, self._seen) > VIEW or status != self._status:
+        if math.dist(place, self._seen) > VIEW_SLACK or status != self._status:
             self._window.write([status, *HELP], place)
             self._seen, self._status = place, status
 
@@ -170,9 +170,9 @@ class Session:
         if self.over:
             return
         x, y, z = (self.force * part for part in direction)
-        self._plant.push(site, (x, y, z), DURATION)
+        self._plant.push(site, (x, y, z), PUSH_DURATION)
         tip = np.asarray(self._plant.engine.site(site))
-        tail = tip - ARROW * np.asarray(direction)
+        tail = tip - ARROW_LENGTH * np.asarray(direction)
         self._window.arrow(tuple(tail.tolist()), tuple(tip.tolist()))
 
     def _next(self) -> None:
@@ -186,7 +186,7 @@ class Session:
         self.paused = not self.paused
 
     def _pace(self, factor: float) -> None:
-        slowest, fastest = SPEEDS
+        slowest, fastest = SPEED_RANGE
         self.speed = min(fastest, max(slowest, self.speed * factor))
 
     def _strengthen(self, factor: float) -> None:

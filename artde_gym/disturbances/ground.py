@@ -14,7 +14,7 @@ from artde_gym.multibody.dynamics import GRAVITY
 from artde_gym.multibody.spec import RobotSpec
 
 LOADED = 1.0  # N, smallest normal force of a foot in contact
-CARRIED = 1e-6  # share of the weight below which a foot is planned to swing; blends end within rounding of zero
+MIN_LOAD_SHARE = 1e-6  # share of the weight below which a foot is planned to swing; blends end within rounding of zero
 AIRBORNE = 0.25  # s, shortest unloaded time of a swing; a foot bounces for up to 0.2 s after landing
 
 
@@ -35,7 +35,7 @@ class GrfPulses:
     """
 
     def __init__(self, n: int, load_left: Array, time_step: float) -> None:
-        carried = np.stack([load_left, 1.0 - load_left], axis=1) > CARRIED
+        carried = np.stack([load_left, 1.0 - load_left], axis=1) > MIN_LOAD_SHARE
         before = np.concatenate([carried[:1], carried[:-1]])
         self._lifts, self._lands = before & ~carried, carried & ~before
         self._time_step = time_step

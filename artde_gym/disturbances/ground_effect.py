@@ -16,7 +16,7 @@ from artde_gym.arrays import Array
 
 Number = TypeVar("Number", float, Array)
 
-LOWEST = 0.5  # radii, smallest height
+MIN_HEIGHT_RADII = 0.5  # radii, smallest height
 
 
 def thrust_gain(height: Number, radius: float, strength: Number, larger: Callable[..., Number]) -> Number:
@@ -24,5 +24,5 @@ def thrust_gain(height: Number, radius: float, strength: Number, larger: Callabl
 
     `larger` is the maximum function for this type of number.
     """
-    height = larger(height, LOWEST * radius)
+    height = larger(height, MIN_HEIGHT_RADII * radius)
     return 1.0 + strength * radius * radius / (16.0 * height * height - radius * radius)

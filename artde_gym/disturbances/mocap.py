@@ -25,7 +25,7 @@ from artde_gym.disturbances.noise import Integers, normal_noise
 from artde_gym.multibody.dynamics import GRAVITY
 from artde_gym.sim.rigid_bodies import cross, rotate_frames, times, transposed_times
 
-FRAME = 1 / 60  # s, camera period
+FRAME_PERIOD = 1 / 60  # s, camera period
 POSITION_NOISE = 3e-4  # m, standard deviation of each component, as for all that follow
 ATTITUDE_NOISE = math.radians(0.1)
 GYROSCOPE_NOISE = 0.005  # rad/s
@@ -39,7 +39,7 @@ class Mocap:
         self._period = period
         self._position = self._velocity = self._rates = self._true_velocity = np.zeros((3, n), dtype)
         self._rot = np.zeros((3, 3, n), dtype)
-        samples = max(FRAME / period, 1.0)  # between two corrections
+        samples = max(FRAME_PERIOD / period, 1.0)  # between two corrections
         interval = samples * period
         drift = ACCELEROMETER_NOISE / math.sqrt(samples)  # as if constant between two corrections
         self._alpha, beta = tracking_gains(drift * interval**2 / POSITION_NOISE)
@@ -107,7 +107,7 @@ def tracking_gains(index: float) -> tuple[float, float]:
 
 def _frame(sample: NDArray[np.int64], period: float) -> NDArray[np.int64]:
     """Return the index of the last camera frame at a sample."""
-    return np.floor(sample * period / FRAME + 1e-6).astype(np.int64)
+    return np.floor(sample * period / FRAME_PERIOD + 1e-6).astype(np.int64)
 
 
 def _turn_between(rot: Array, other: Array) -> Array:

@@ -24,7 +24,7 @@ from artde_gym.arrays import Array
 from artde_gym.disturbances.noise import uniform_noise
 
 GRID = 0.005  # s
-BLOCK = 400  # grid points whose noise is generated at once for one vehicle
+BLOCK_SIZE = 400  # grid points whose noise is generated at once for one vehicle
 
 Number = TypeVar("Number", float, Array)
 Vector3 = tuple[Number, Number, Number]
@@ -114,9 +114,9 @@ class Wind:
         """Return the wind velocity (m/s, world axes) at `position` (m) from this grid point to the next."""
         velocity_now = velocity(self._air, self._states, position, math.exp)
         if not self._noise:
-            block = np.arange(self._read, self._read + BLOCK, dtype=np.uint64)
+            block = np.arange(self._read, self._read + BLOCK_SIZE, dtype=np.uint64)
             self._noise = uniform_noise(self._key, block).T[::-1].tolist()  # read from the end
-            self._read += BLOCK
+            self._read += BLOCK_SIZE
         x, y, z, turbulence = map(advance, self._keep, self._kick, self._states, self._noise.pop())
         self._states = x, y, z, turbulence
         return velocity_now

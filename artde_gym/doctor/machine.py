@@ -19,7 +19,7 @@ from artde_gym.sim.factory import missing_bullet
 PACKAGE = "artde-gym"
 MODULES = {"mujoco": "mujoco", "numpy": "numpy", "scipy": "scipy", "matplotlib": "matplotlib", "pandas": "pandas"}
 """Packages with compiled parts -> modules whose import proves that they load."""
-DISK = 1e9  # bytes, enough for most results folders
+FREE_DISK_BYTES = 1e9  # bytes, enough for most results folders
 RUNS = Path("runs")
 
 
@@ -83,7 +83,7 @@ def files() -> list[CheckResult]:
     free = shutil.disk_usage(place).free
     room = f"{free / 1e9:.1f} GB free"
     outcomes = [CheckResult("results folder", "ok", f"{RUNS}/ is writable")]
-    if free < DISK:
+    if free < FREE_DISK_BYTES:
         return [
             *outcomes,
             CheckResult("disk", "missing", room, "free some space, or name a folder elsewhere with --out"),

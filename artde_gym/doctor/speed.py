@@ -10,9 +10,9 @@ from artde_gym.benchmark.walk import LEAST, BareWalk
 from artde_gym.doctor.check_result import CheckResult
 
 ROUNDS = 10
-SHARE = 0.75
+PASSING_SHARE = 0.75
 """Share of the benchmark's required rate that passes: a measurement of one second is inexact."""
-REAL_TIME = 1000  # steps of 1 ms per second
+REAL_TIME_RATE = 1000  # steps of 1 ms per second
 
 
 def speed() -> list[CheckResult]:
@@ -25,10 +25,10 @@ def speed() -> list[CheckResult]:
                     "bare": BareWalk(loop, engine).turn}  # fmt: skip
         times = in_turns(variants, ROUNDS)
         rate, ratio = TURN / times["loop"], times["bare"] / times["alone"]
-        found = f"{rate:.0f} steps per second under ARTDE, {rate / REAL_TIME:.1f} x real time"
+        found = f"{rate:.0f} steps per second under ARTDE, {rate / REAL_TIME_RATE:.1f} x real time"
         slow = "close other programs; check that the processor is not emulated or throttled"
-        outcomes.append(_judged(written, found, rate > REAL_TIME, slow))
-        wanted = SHARE * LEAST.get((engine, "environment"), 0.0)
+        outcomes.append(_judged(written, found, rate > REAL_TIME_RATE, slow))
+        wanted = PASSING_SHARE * LEAST.get((engine, "environment"), 0.0)
         found = f"env.step at {ratio:.2f} of the bare engine's rate"
         heavy = f"expected {wanted:.2f} or more: set OMP_NUM_THREADS=1, close other programs, see `artde-gym benchmark`"
         outcomes.append(_judged(written, found, ratio > wanted, heavy))

@@ -32,7 +32,7 @@ from artde_gym.sim.factory import EngineName, make_engine, resolve_engine
 from artde_gym.sim.rotation import arcsine, roll_pitch
 
 CAMERA_HEIGHT = 0.42  # m, of the camera's target
-LEEWAY = 0.15  # m, distance from the pattern beyond which the camera follows the robot
+CAMERA_SLACK = 0.15  # m, distance from the pattern beyond which the camera follows the robot
 
 _PAGE = (
     task.DOCUMENTATION
@@ -117,7 +117,7 @@ class BipedEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any]]):
             self.engine_name, walk.robot, task.TIME_STEP, renders=render_mode is not None
         )
         camera = Camera((0.0, 0.0, CAMERA_HEIGHT), width=width, height=height)
-        self.view = View(self._engine, camera, self.control_period, share=1.0, slack=LEEWAY)
+        self.view = View(self._engine, camera, self.control_period, share=1.0, slack=CAMERA_SLACK)
         self.metadata = {**self.metadata, **self.view.metadata}
         self.observe_ground_force = observe_ground_force
         self.observation_layout = task.observation_layout(observe_ground_force)

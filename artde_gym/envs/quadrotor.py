@@ -37,9 +37,10 @@ from artde_gym.sim.rotation import matrix
 TIME_STEP = 0.001  # s, of the physics
 STEPS = 5  # physics steps from one grid point to the next
 
-CENTER: Vector = (0.0, 0.0, 0.6)  # m, of the path
-CAMERA = Camera(CENTER, distance=3.0, yaw_deg=35.0, pitch_deg=24.0)
-SHARE, LEEWAY = 0.5, 0.6  # of the vehicle's offset from the center; m, its largest distance from the frame's center
+PATH_CENTER: Vector = (0.0, 0.0, 0.6)  # m, of the path
+CAMERA = Camera(PATH_CENTER, distance=3.0, yaw_deg=35.0, pitch_deg=24.0)
+CAMERA_SHARE = 0.5  # of the vehicle's offset from the path's center that the camera does not follow
+CAMERA_SLACK = 0.6  # m, largest distance of the vehicle from the frame's center
 
 _NOTHING = (0.0, 0.0, 0.0)
 _NO_JOINTS = np.zeros(0)
@@ -123,7 +124,9 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
         self._engine: Engine = make_engine(
             self.engine_name, self.nominal_robot, TIME_STEP, renders=render_mode is not None
         )
-        self.view = View(self._engine, CAMERA._replace(width=width, height=height), self.control_period, SHARE, LEEWAY)
+        self.view = View(
+            self._engine, CAMERA._replace(width=width, height=height), self.control_period, CAMERA_SHARE, CAMERA_SLACK
+        )
         self.metadata = {**self.metadata, **self.view.metadata}
         self._engine.reset(START, _NO_JOINTS)
         self._placed = self._engine.save_state()
@@ -182,7 +185,7 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
         step = self.elapsed
         pushes = self._schedule.acting(step)
         path = self._plan[:, :3]
-        return self.view.picture(step * TIME_STEP, CENTER, pushes, self._sampled, path=path, over=self._over)
+        return self.view.picture(step * TIME_STEP, PATH_CENTER, pushes, self._sampled, path=path, over=self._over)
 
     def close(self) -> None:
         self._engine.close()

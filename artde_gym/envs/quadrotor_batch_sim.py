@@ -26,9 +26,9 @@ from artde_gym.robots.q450 import task
 from artde_gym.sim.engine import PAYLOAD_RADIUS
 from artde_gym.sim.rigid_bodies import MassProperties, RigidBodies, composite, cross, times, transposed_times
 
-FINE = 0.001  # s, resolution of pushes
-PARTS = round(GRID / FINE)
-SLOTS = int(OWN["action_delay"].parameters[0].high) + 1  # commands stored for the longest delay
+PUSH_RESOLUTION = 0.001  # s
+PARTS = round(GRID / PUSH_RESOLUTION)
+DELAY_SLOTS = int(OWN["action_delay"].parameters[0].high) + 1  # commands stored for the longest delay
 
 _SITES = {name: place for name, _, place in robot.q450().sites}
 
@@ -66,7 +66,7 @@ class QuadrotorBatchSim:
         self._shares = np.zeros((2, n), dtype)  # of the rotors' lag
         self._left = np.ones((4, n), dtype)  # remaining share of each rotor's thrust
         self._delay = np.zeros(n, np.int64)  # control periods
-        self._late: Array | None = None  # targets of the last periods (SLOTS, 4, n), once a vehicle needs them
+        self._late: Array | None = None  # targets of the last periods (DELAY_SLOTS, 4, n), once a vehicle needs them
         self._air = np.zeros((len(Air._fields), n), dtype)
         self._keys = np.zeros(n, np.uint64)
         self._wind = np.zeros((4, n), dtype)  # states of the wind's processes
@@ -159,7 +159,7 @@ class QuadrotorBatchSim:
         self._left[:, vehicle] = 1.0
         self._delay[vehicle] = sampled.get("action_delay", {}).get("steps", 0)
         if self._late is None and self._delay[vehicle]:
-            self._late = np.zeros((SLOTS, *self.thrusts.shape), self.thrusts.dtype)
+            self._late = np.zeros((DELAY_SLOTS, *self.thrusts.shape), self.thrusts.dtype)
         if self._late is not None:
             self._late[..., vehicle] = hover
 
@@ -170,8 +170,8 @@ class QuadrotorBatchSim:
         if self._late is None:
             return aims
         period = self._step // self._steps
-        self._late[period % SLOTS] = aims
-        return self._late[(period - self._delay) % SLOTS, :, np.arange(aims.shape[1])].T
+        self._late[period % DELAY_SLOTS] = aims
+        return self._late[(period - self._delay) % DELAY_SLOTS, :, np.arange(aims.shape[1])].T
 
     def _noise(self) -> Array:
         """Return the noise of the wind for the steps of this control period (4, steps, n)."""
@@ -221,7 +221,7 @@ class QuadrotorBatchSim:
 
     def _push_events(self, vehicle: int, sampled: Mapping[str, Any]) -> list[_Event]:
         """Return the events of the pushes; a push acts for the share of a step that it covers."""
-        pushes = [Push.of(entry, FINE) for entry in sampled.get("push", ())]
+        pushes = [Push.of(entry, PUSH_RESOLUTION) for entry in sampled.get("push", ())]
         missing = len(pushes) - len(self._pushes)
         if missing > 0:
             more = np.zeros((missing, *self._pushes.shape[1:]), self._pushes.dtype)

@@ -19,13 +19,13 @@ from artde_gym.sim.engine import Engine
 
 RATE = 30.0  # frames per simulated second
 MAX_FPS, SLOW_FPS = 100.0, 50.0  # frames/s: the most that a video can have; its rate in slow motion
-SIZES = (16, 4096)  # pixels, smallest and largest width or height
+FRAME_SIZES = (16, 4096)  # pixels, smallest and largest width or height
 PUSH = (196, 22, 60)
 PATH = (120, 130, 150)
 INK = (27, 31, 36)
 METERS_PER_NEWTON = 0.012  # length of a push's arrow
-ARROW = (0.16, 0.6)  # m, its smallest and largest length
-FINER = 3  # oversampling of drawn lines for smooth edges
+ARROW_LENGTHS = (0.16, 0.6)  # m, smallest and largest
+OVERSAMPLING = 3  # of drawn lines, for smooth edges
 
 
 class View:
@@ -48,7 +48,7 @@ class View:
     """
 
     def __init__(self, engine: Engine, camera: Camera, control_period: float, share: float, slack: float) -> None:
-        low, high = SIZES
+        low, high = FRAME_SIZES
         for name in ("width", "height"):
             size = getattr(camera, name)
             if not (isinstance(size, int) and low <= size <= high):
@@ -128,7 +128,7 @@ def _arrow(picture: Image.Image, camera: Camera, point: Vector, force: Vector) -
     size = float(np.linalg.norm(force))
     if size == 0.0:
         return
-    length = float(np.clip(METERS_PER_NEWTON * size, *ARROW))
+    length = float(np.clip(METERS_PER_NEWTON * size, *ARROW_LENGTHS))
     end = np.asarray(point)
     tail, tip = camera.pixels([end - length * np.asarray(force) / size, end])
     along = tip - tail
@@ -150,21 +150,21 @@ def _arrow(picture: Image.Image, camera: Camera, point: Vector, force: Vector) -
 
 def _fill(picture: Image.Image, corners: Sequence[Array], color: tuple[int, int, int]) -> None:
     """Draw a polygon with smooth edges and a white rim."""
-    points = [(FINER * float(x), FINER * float(y)) for x, y in corners]
-    rim = Image.new("L", (FINER * picture.width, FINER * picture.height))
-    ImageDraw.Draw(rim).line([*points, points[0]], 255, 2 * FINER, "curve")
+    points = [(OVERSAMPLING * float(x), OVERSAMPLING * float(y)) for x, y in corners]
+    rim = Image.new("L", (OVERSAMPLING * picture.width, OVERSAMPLING * picture.height))
+    ImageDraw.Draw(rim).line([*points, points[0]], 255, 2 * OVERSAMPLING, "curve")
     body = Image.new("L", rim.size)
     ImageDraw.Draw(body).polygon(points, 255)
-    picture.paste((255, 255, 255), None, rim.reduce(FINER))
-    picture.paste(color, None, body.reduce(FINER))
+    picture.paste((255, 255, 255), None, rim.reduce(OVERSAMPLING))
+    picture.paste(color, None, body.reduce(OVERSAMPLING))
 
 
 def _line(picture: Image.Image, points: Array, color: tuple[int, int, int]) -> None:
     """Draw a thin, half-transparent line through pixels (n, 2)."""
-    mask = Image.new("L", (FINER * picture.width, FINER * picture.height))
+    mask = Image.new("L", (OVERSAMPLING * picture.width, OVERSAMPLING * picture.height))
     whole = np.isfinite(points).all(axis=1)
-    ImageDraw.Draw(mask).line([*map(tuple, (FINER * points[whole]).tolist())], 150, FINER)
-    picture.paste(color, None, mask.reduce(FINER))
+    ImageDraw.Draw(mask).line([*map(tuple, (OVERSAMPLING * points[whole]).tolist())], 150, OVERSAMPLING)
+    picture.paste(color, None, mask.reduce(OVERSAMPLING))
 
 
 def _write(picture: Image.Image, lines: Sequence[str]) -> None:

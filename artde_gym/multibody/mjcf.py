@@ -18,7 +18,7 @@ PAYLOAD = "payload"
 """A massless body fixed to the base, to which an engine can assign the payload's mass and position."""
 CONTACT_TIME = 0.005  # s; about as stiff as Bullet's contacts, which correct a fifth of the depth each millisecond
 IMPEDANCE = (0.9, 0.95, 0.001)
-MEMORY = "1M"
+ARENA_MEMORY = "1M"
 """Memory for contacts and constraints: thirty times the need of both feet on the ground; MuJoCo's default is 14 MB."""
 
 # the light of Bullet's renderer, so that images of both engines look alike
@@ -40,7 +40,7 @@ def mjcf(spec: RobotSpec) -> str:
     option = ET.SubElement(root, "option", solver, impratio="10")
     # no automatic reset of a diverging state; no search for independent islands, which one robot does not have
     ET.SubElement(option, "flag", autoreset="disable", island="disable")
-    ET.SubElement(root, "size", memory=MEMORY)
+    ET.SubElement(root, "size", memory=ARENA_MEMORY)
     default = ET.SubElement(root, "default")
     ET.SubElement(default, "geom", contype="0", conaffinity="0")
     soft = {"solref": numbers((CONTACT_TIME, 1.0)), "solimp": numbers(IMPEDANCE)}

@@ -35,7 +35,7 @@ GEAR_ITERATIONS = 60  # of the solver; with 30, the gears' residual raises ARTDE
 BARE_ITERATIONS = 50  # of the solver without gears
 GEAR_FORCE = 1e6  # N, more than any gear carries
 PAYLOAD_FORCE = 1e5  # N, more than any payload's constraint carries
-FAR = 30.0  # m, distance of the far clipping plane
+FAR_PLANE = 30.0  # m, from the camera
 CONTACT_SHARE = 0.08  # of a foot's penetration depth corrected per time step, Bullet's default
 HOLD_TORQUE = 100.0  # Nm, of the motors that hold unactuated joints
 
@@ -373,7 +373,7 @@ class BulletEngine:
         view = bullet.computeViewMatrixFromYawPitchRoll(
             camera.target, camera.distance, camera.yaw_deg, -camera.pitch_deg, 0.0, 2
         )
-        lens = bullet.computeProjectionMatrixFOV(FIELD_OF_VIEW, camera.width / camera.height, NEAR, FAR)
+        lens = bullet.computeProjectionMatrixFOV(FIELD_OF_VIEW, camera.width / camera.height, NEAR, FAR_PLANE)
         payload, ball = self.payload_position(), None
         if payload is not None:  # only now: reading the mesh of its ball takes longer than a reset
             ball = bullet.createMultiBody(0.0, -1, self._ball, payload, physicsClientId=self._client)

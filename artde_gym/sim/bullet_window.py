@@ -23,13 +23,13 @@ from artde_gym.sim.pybullet_module import bullet
 from artde_gym.sim.rotation import rotate
 
 PATIENCE = 60.0  # s, timeout for the first window
-NEAR_CLICK = 60.0  # pixels, largest distance of a click from its target
+CLICK_RADIUS = 60.0  # pixels, largest distance of a click from its target
 INK, RED = (0.1, 0.12, 0.14), (0.77, 0.09, 0.24)
-ABOVE = 0.55  # m, height of the text above the camera's target
-LIGHT = 3.0  # multiple of the sun's vector at which the lamp is
-LASTING = 0.4  # s, lifetime of an arrow
-_AWAY: Vector = (0.0, 0.0, -10.0)  # m, below the ground
-_LINE = 0.09  # m, line spacing of the text
+TEXT_HEIGHT = 0.55  # m, height of the text above the camera's target
+LIGHT_DISTANCE = 3.0  # multiple of the sun's vector at which the lamp is
+ARROW_LIFETIME = 0.4  # s
+_HIDDEN_POSITION: Vector = (0.0, 0.0, -10.0)  # m, below the ground
+_LINE_SPACING = 0.09  # m, of the text
 
 _KEYS = {
     bullet.B3G_LEFT_ARROW: "left",
@@ -102,7 +102,7 @@ class BulletWindow:
         joints = range(bullet.getNumJoints(self._robot, **self._client))
         links = {bullet.getJointInfo(self._robot, i, **self._client)[12].decode(): i for i in joints}
         self._joints = [links[name] for name in spec.actuated]
-        light = [LIGHT * part for part in SUN]
+        light = [LIGHT_DISTANCE * part for part in SUN]
         bullet.configureDebugVisualizer(bullet.COV_ENABLE_RENDERING, 1, lightPosition=light, **self._client)
 
     def _body(self, kind: int, **shape: Any) -> int:
@@ -115,7 +115,9 @@ class BulletWindow:
         if self._joints:
             angles = [[angle] for angle in state.q.tolist()]
             bullet.resetJointStatesMultiDof(self._robot, self._joints, angles, **self._client)
-        bullet.resetBasePositionAndOrientation(self._payload, payload or _AWAY, (0.0, 0.0, 0.0, 1.0), **self._client)
+        bullet.resetBasePositionAndOrientation(
+            self._payload, payload or _HIDDEN_POSITION, (0.0, 0.0, 0.0, 1.0), **self._client
+        )
 
     def close(self) -> None:
         """Close it; safe to call twice and after the user closed it."""
@@ -156,7 +158,7 @@ class BulletWindow:
         y = (1 - seen[:, 1] / seen[:, 3]) * height / 2
         off = np.hypot(x - presses[-1][0], y - presses[-1][1])
         nearest = int(np.argmin(off))
-        return nearest if off[nearest] < NEAR_CLICK else None
+        return nearest if off[nearest] < CLICK_RADIUS else None
 
     def ahead(self) -> Vector:
         """Return the horizontal viewing direction (unit vector)."""
@@ -179,11 +181,11 @@ class BulletWindow:
         """Show lines of text above a position (m), replacing previous ones."""
         x, y, z = place
         for number, line in enumerate(lines):
-            at = (x, y, z + ABOVE + _LINE * (len(lines) - number))
+            at = (x, y, z + TEXT_HEIGHT + _LINE_SPACING * (len(lines) - number))
             more = {"replaceItemUniqueId": self._words[number]} if number < len(self._words) else {}
             item = bullet.addUserDebugText(line, at, INK, 1.2, **more, **self._client)
             self._words[number : number + 1] = [item]
 
     def arrow(self, tail: Vector, tip: Vector) -> None:
         """Show a force briefly as an arrow."""
-        bullet.addUserDebugLine(tail, tip, RED, 6.0, LASTING, **self._client)
+        bullet.addUserDebugLine(tail, tip, RED, 6.0, ARROW_LIFETIME, **self._client)

@@ -22,14 +22,14 @@ from artde_gym.sim.engine import PAYLOAD_LOOK, State
 from artde_gym.sim.rotation import matrix
 
 SUN: Vector = (1.0, 1.5, 3.0)  # direction toward the sun
-SKY = (255, 255, 255)
-FLOOR = (231, 236, 242)
-LINE = (172, 186, 206)
-SHADE = (0.80, 0.83, 0.90)  # brightness in a shadow (red, green, blue)
-SPACING = 0.5  # m, between lines
-THICKNESS = 0.012  # m, of a line
-FADING = 9.0  # m, after which two thirds of the ground have faded
-SOFTNESS = 1.0  # pixels, width of a shadow's edge
+SKY_COLOR = (255, 255, 255)
+FLOOR_COLOR = (231, 236, 242)
+LINE_COLOR = (172, 186, 206)
+SHADOW_BRIGHTNESS = (0.80, 0.83, 0.90)  # brightness in a shadow (red, green, blue)
+LINE_SPACING = 0.5  # m, between lines
+LINE_THICKNESS = 0.012  # m, of a line
+FADING_DISTANCE = 9.0  # m, after which two thirds of the ground have faded
+SHADOW_SOFTNESS = 1.0  # pixels, width of a shadow's edge
 
 _CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 _FACES = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]]
@@ -66,19 +66,19 @@ def paint(picture: NDArray[np.uint8], bare: NDArray[np.bool_], camera: Camera, s
     """Paint ground and sky over the `bare` pixels (height, width) that the engine left empty."""
     x, y, z = camera.target
     view = _view(camera._replace(target=(0.0, 0.0, z)))
-    picture[: view.top][bare[: view.top]] = SKY
+    picture[: view.top][bare[: view.top]] = SKY_COLOR
     free = bare[view.top :]
     if not free.any():
         return
-    along_y = _lines(view.x + np.float32(x % SPACING), view.wide)
-    along_x = _lines(view.y + np.float32(y % SPACING), view.high)
+    along_y = _lines(view.x + np.float32(x % LINE_SPACING), view.wide)
+    along_x = _lines(view.y + np.float32(y % LINE_SPACING), view.high)
     line = np.maximum(along_x, along_y)
     sun = _sunlight(camera, shadow)[view.top :]
     fog = view.fog
     for i in range(3):
-        color = FLOOR[i] + (LINE[i] - FLOOR[i]) * line
-        color *= 1.0 - (1.0 - SHADE[i]) * sun
-        color += (SKY[i] - color) * fog
+        color = FLOOR_COLOR[i] + (LINE_COLOR[i] - FLOOR_COLOR[i]) * line
+        color *= 1.0 - (1.0 - SHADOW_BRIGHTNESS[i]) * sun
+        color += (SKY_COLOR[i] - color) * fog
         picture[view.top :, :, i][free] = (color[free] + 0.5).astype(np.uint8)
 
 
@@ -109,7 +109,7 @@ def _view(camera: Camera) -> _View:
     rays = rays[top:]
     reach = -eye[2] / rays[..., 2]
     x, y = eye[0] + reach * rays[..., 0], eye[1] + reach * rays[..., 1]
-    fog = 1.0 - np.exp(-((np.hypot(x, y) / FADING) ** 2))
+    fog = 1.0 - np.exp(-((np.hypot(x, y) / FADING_DISTANCE) ** 2))
     wide, high = (_extent(values) for values in (x, y))
     return _View(top, *(values.astype(np.float32) for values in (x, y, wide, high, fog)))
 
@@ -124,10 +124,10 @@ def _extent(values: Array) -> Array:
 
 def _lines(place: Array, extent: Array) -> Array:
     """Return the share of each pixel covered by lines."""
-    distance = np.abs(place - SPACING * np.round(place / SPACING))
-    covered = np.minimum((THICKNESS + extent) / 2 - distance, np.minimum(THICKNESS, extent))
+    distance = np.abs(place - LINE_SPACING * np.round(place / LINE_SPACING))
+    covered = np.minimum((LINE_THICKNESS + extent) / 2 - distance, np.minimum(LINE_THICKNESS, extent))
     share = np.clip(covered, 0.0, None) / extent
-    return np.where(extent > SPACING, THICKNESS / SPACING, share)
+    return np.where(extent > LINE_SPACING, LINE_THICKNESS / LINE_SPACING, share)
 
 
 def _sunlight(camera: Camera, shadow: Sequence[Array]) -> Array:
@@ -139,7 +139,7 @@ def _sunlight(camera: Camera, shadow: Sequence[Array]) -> Array:
         for corners in np.split(camera.pixels(np.concatenate(shadow)), ends):
             if np.isfinite(corners).all():
                 draw.polygon([*map(tuple, corners.tolist())], fill=255)
-    return np.asarray(mask.filter(ImageFilter.GaussianBlur(SOFTNESS)), dtype=np.float32) / 255
+    return np.asarray(mask.filter(ImageFilter.GaussianBlur(SHADOW_SOFTNESS)), dtype=np.float32) / 255
 
 
 def _cast(points: Array) -> Array:

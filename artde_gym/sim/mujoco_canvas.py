@@ -28,7 +28,7 @@ _LIBRARIES = {"egl": "libEGL.so.1", "osmesa": "libOSMesa.so.8"}
 _ALLOWED = (
     "with OpenGL of EGL or OSMesa (Debian: apt install libegl1 libgl1-mesa-dri, or libosmesa6); or engine 'bullet'"
 )
-_SHAPES = 1000  # most shapes in a scene
+_MAX_SHAPES = 1000  # most shapes in a scene
 
 
 class Canvas:
@@ -44,7 +44,7 @@ class Canvas:
         context.make_current()
         self._painter = mj.MjrContext(model, mj.mjtFontScale.mjFONTSCALE_100)
         mj.mjr_setBuffer(mj.mjtFramebuffer.mjFB_OFFSCREEN, self._painter)
-        self._scene = mj.MjvScene(model, _SHAPES)
+        self._scene = mj.MjvScene(model, _MAX_SHAPES)
         self._finalizer = weakref.finalize(self, _free, context, self._painter)
         self._finalizer.atexit = False  # too late: EGL's display is closed by then
         atexit.register(self._finalizer)

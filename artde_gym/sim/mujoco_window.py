@@ -21,12 +21,12 @@ from artde_gym.sim.mujoco_world import Blueprint
 mj: Any = mujoco  # compiled, without type information
 
 SIZE = (1024, 768)
-NEAR_CLICK = 60.0  # pixels, largest distance of a click from its target
+CLICK_RADIUS = 60.0  # pixels, largest distance of a click from its target
 RED, GROUND = (0.77, 0.09, 0.24, 1.0), (0.82, 0.84, 0.86, 1.0)
-THIN = 0.012  # m, thickness of an arrow
-LASTING = 12  # frames, lifetime of an arrow
-SHAPES = 1000  # most shapes in a scene
-ZOOM = -0.05  # of the distance, per notch of the wheel
+ARROW_THICKNESS = 0.012  # m
+ARROW_FRAMES = 12  # lifetime of an arrow
+MAX_SHAPES = 1000  # most shapes in a scene
+ZOOM_SHARE = -0.05  # of the distance, per notch of the wheel
 
 _KEYS = {
     glfw.KEY_LEFT: "left",
@@ -68,14 +68,16 @@ class MujocoWindow:
         glfw.set_char_callback(self._window, lambda _, code: self._keys.append(chr(code)) if code != 32 else None)
         glfw.set_mouse_button_callback(self._window, self._on_button)
         glfw.set_cursor_pos_callback(self._window, self._on_move)
-        glfw.set_scroll_callback(self._window, lambda _, _x, y: self._turn(mj.mjtMouse.mjMOUSE_ZOOM, 0.0, ZOOM * y))
+        glfw.set_scroll_callback(
+            self._window, lambda _, _x, y: self._turn(mj.mjtMouse.mjMOUSE_ZOOM, 0.0, ZOOM_SHARE * y)
+        )
 
     def load(self, spec: RobotSpec) -> None:
         """Build the robot and start drawing."""
         blueprint = Blueprint(spec, 0.001)
         self._model, self._joints = blueprint.model, blueprint.joints
         self._data = mj.MjData(self._model)
-        self._scene = mj.MjvScene(self._model, SHAPES)
+        self._scene = mj.MjvScene(self._model, MAX_SHAPES)
         self._painter = mj.MjrContext(self._model, mj.mjtFontScale.mjFONTSCALE_150)
 
     def show(self, state: State, payload: Vector | None) -> None:
@@ -92,8 +94,8 @@ class MujocoWindow:
         if payload is not None:
             self._shape(mj.mjtGeom.mjGEOM_SPHERE, payload, (PAYLOAD_LOOK, 0.0, 0.0), PAYLOAD_COLOR)
         for tail, tip, _ in self._arrows:
-            shape = self._shape(mj.mjtGeom.mjGEOM_ARROW, tail, (THIN, THIN, THIN), RED)
-            mj.mjv_connector(shape, mj.mjtGeom.mjGEOM_ARROW, THIN, np.array(tail), np.array(tip))
+            shape = self._shape(mj.mjtGeom.mjGEOM_ARROW, tail, (ARROW_THICKNESS, ARROW_THICKNESS, ARROW_THICKNESS), RED)
+            mj.mjv_connector(shape, mj.mjtGeom.mjGEOM_ARROW, ARROW_THICKNESS, np.array(tail), np.array(tip))
         self._arrows = [(tail, tip, left - 1) for tail, tip, left in self._arrows if left > 1]
         rect = mj.MjrRect(0, 0, *glfw.get_framebuffer_size(self._window))
         mj.mjr_render(rect, self._scene, self._painter)
@@ -129,7 +131,7 @@ class MujocoWindow:
             return None
         off = np.hypot(*(self._project(np.asarray(points)) - np.array(presses[-1])).T)
         nearest = int(np.argmin(off))
-        return nearest if off[nearest] < NEAR_CLICK else None
+        return nearest if off[nearest] < CLICK_RADIUS else None
 
     def ahead(self) -> Vector:
         """Return the horizontal viewing direction (unit vector)."""
@@ -153,7 +155,7 @@ class MujocoWindow:
 
     def arrow(self, tail: Vector, tip: Vector) -> None:
         """Show a force briefly as an arrow."""
-        self._arrows.append((tail, tip, LASTING))
+        self._arrows.append((tail, tip, ARROW_FRAMES))
 
     def _shape(self, kind: Any, place: Vector, size: Vector, color: tuple[float, ...]) -> Any:
         """Add a shape to the scene."""

@@ -20,7 +20,7 @@ from artde_gym.report.signals import add, over_time
 from artde_gym.robots.ojas.model import ojas
 from artde_gym.robots.ojas.walking import walking_pattern
 
-SHOWN = 10.0  # s of the walk, from its start
+SHOWN_DURATION = 10.0  # s of the walk, from its start
 SIDES: dict[str, Style] = {"left": OTHERS[3], "right": OTHERS[4]}
 BODY = {"center of mass": OTHERS[2], **{f"{side} foot": look for side, look in SIDES.items()}}
 PERIOD = 0.001  # s, sampling period of the pattern
@@ -69,7 +69,7 @@ def reference(kwargs: Mapping[str, Any]) -> dict[str, list[str]]:
 def _pattern(arguments: Mapping[str, Any]) -> list[str]:
     """Return figures of the reference of the center of mass, the feet and the joints."""
     pattern = walking_pattern(**arguments, period=PERIOD)
-    part = slice(0, round(SHOWN / PERIOD), 10)
+    part = slice(0, round(SHOWN_DURATION / PERIOD), 10)
     time = PERIOD * np.arange(len(pattern.q))[part]
     com = pattern.base[part] + RigidBodyTree(ojas("none")).center_of_mass(pattern.q[part])
     paths = {"center of mass": com, "left foot": pattern.feet[part, 0], "right foot": pattern.feet[part, 1]}
@@ -88,7 +88,7 @@ def _pattern(arguments: Mapping[str, Any]) -> list[str]:
         for side, column in columns.items():
             chart.line(time, column, SIDES[side], text=side)
         joints[f"q{i + 1}"] = chart.svg()
-    first = f"the first {min(SHOWN, float(time[-1])):.0f} s"
+    first = f"the first {min(SHOWN_DURATION, float(time[-1])):.0f} s"
     return [
         figure(f"Desired trajectories of the center of mass and the ankles, {first}.", trajectories, BODY),
         figure(f"Desired joint trajectories of both legs, {first}.", joints, SIDES),
@@ -103,14 +103,14 @@ def _ground(episode: Episode) -> str:
         if loads is None:
             continue
         time = signals.time[: len(loads)]
-        chosen = time <= SHOWN
+        chosen = time <= SHOWN_DURATION
         chart = _chart(f"Ground reaction force under {name}", "force (N)", time[chosen], [loads[chosen]])
         for i, side in enumerate(SIDES):
             chart.line(time[chosen], loads[chosen, i], SIDES[side], text=side)
         charts[name] = chart.svg()
     if not charts:
         return paragraph("Ground reaction forces are not among the stored signals of this run.", "soft")
-    return figure(f"Ground reaction force on each leg, vertical, the first {SHOWN:.0f} s.", charts, SIDES)
+    return figure(f"Ground reaction force on each leg, vertical, the first {SHOWN_DURATION:.0f} s.", charts, SIDES)
 
 
 def _loads(signals: Signals) -> Array | None:

@@ -35,9 +35,9 @@ from artde_gym.robots.ojas.leg_ik import leg_angles
 STAND = 2.0  # s, before the first step and after the last one
 DOUBLE_SUPPORT = 0.2  # share of a step
 STEP_HEIGHT = 0.04  # m
-GRID = 0.005  # s, of the pendulum problem and of the spline knots
-PASSES = 5  # of the multibody correction
-LONGEST = 1800.0  # s, of a walk; it needs 1.5 MB per second, and 3 % of its duration for planning
+GRID_PERIOD = 0.005  # s, of the pendulum problem and of the spline knots
+CORRECTION_PASSES = 5  # of the multibody correction
+MAX_DURATION = 1800.0  # s, of a walk; it needs 1.5 MB per second, and 3 % of its duration for planning
 
 _HIPS = np.array([[0.0, robot.HIP_OFFSET, 0.0], [0.0, -robot.HIP_OFFSET, 0.0]])
 
@@ -93,7 +93,7 @@ def walking_pattern(
     step_duration = check_number("step_duration", step_duration, 0.6, 2.0, "0.6 to 2 s")
     if speed * step_duration > 0.25:
         raise OptionError("speed * step_duration", speed * step_duration, "a step of at most 0.25 m")
-    duration = check_number("duration", duration, 0.1, LONGEST, f"0.1 to {LONGEST:g} s")
+    duration = check_number("duration", duration, 0.1, MAX_DURATION, f"0.1 to {MAX_DURATION:g} s")
     period = check_number("period", period, 1e-6, 0.1, "1e-6 to 0.1 s")
     return _pattern(speed, step_duration, duration, period)  # positional: the cache distinguishes keyword arguments
 
@@ -101,7 +101,7 @@ def walking_pattern(
 @functools.lru_cache(maxsize=8)
 def _pattern(speed: float, step_duration: float, duration: float, period: float) -> WalkingPattern:
     gait = _Gait(speed, step_duration, duration)
-    time = GRID * np.arange(math.ceil(duration / GRID - 1e-9) + 1)
+    time = GRID_PERIOD * np.arange(math.ceil(duration / GRID_PERIOD - 1e-9) + 1)
     hips = _solve(gait, time)
     fine = period * np.arange(math.floor(duration / period + 1e-9) + 1)
     spline = _spline(time, _joint_angles(hips, gait.feet(time)))
@@ -193,14 +193,14 @@ def _solve(gait: _Gait, time: Array) -> Array:
     com = tree.center_of_mass(_joint_angles(hips[:1], feet[:1]))[0]
     height = hips[0, 2] + com[2]
     hips[:, :2] = _pendulum(zmp, height) - com[:2]
-    for _ in range(PASSES):
+    for _ in range(CORRECTION_PASSES):
         hips[:, :2] -= _pendulum(_multibody_zmp(tree, time, hips, feet) - zmp, height)
     return hips
 
 
 def _pendulum(zmp: Array, height: float) -> Array:
     """Solve c - (z/g) c'' = p for each column, with c = p at both ends."""
-    count, ratio = len(zmp), height / GRAVITY / GRID**2
+    count, ratio = len(zmp), height / GRAVITY / GRID_PERIOD**2
     bands = np.zeros((3, count))
     bands[0, 2:] = bands[2, :-2] = -ratio
     bands[1] = 1 + 2 * ratio

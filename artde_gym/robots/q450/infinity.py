@@ -22,7 +22,7 @@ from artde_gym.arrays import Array
 START = (0.0, 0.0, 0.6)  # m
 LOOPS = ((0.0, 33.0), (37.0, 70.0))  # s
 RAMP = 4.0  # s
-LONGEST = 7200.0  # s
+MAX_DURATION = 7200.0  # s
 
 _AMPLITUDE = np.array([1.2, 0.6, 0.2])
 _FREQUENCY = np.array([1.0, 2.0, 1.0])  # waves per turn
@@ -54,7 +54,7 @@ def infinity_path(duration: float = 70.0, period: float = 0.015) -> InfinityPath
     Raises:
         OptionError: for a path outside 0.1 to 7200 s, or a period outside 1e-6 to 0.1 s.
     """
-    duration = check_number("duration", duration, 0.1, LONGEST, f"0.1 to {LONGEST:g} s")
+    duration = check_number("duration", duration, 0.1, MAX_DURATION, f"0.1 to {MAX_DURATION:g} s")
     period = check_number("period", period, 1e-6, 0.1, "1e-6 to 0.1 s")
     return _path(duration, period)  # positional: the cache distinguishes keyword arguments
 

@@ -58,7 +58,7 @@ MIN_WRENCH = (0.0, -MAX_WRENCH[1], -MAX_WRENCH[2], -MAX_WRENCH[3])
 
 Number = TypeVar("Number", float, Array)
 
-STRIPS = 12  # boxes per rotor disc in images
+DISC_STRIPS = 12  # boxes per rotor disc in images
 
 _DARK = (0.16, 0.17, 0.20, 1.0)
 _RED = (0.75, 0.20, 0.18, 1.0)
@@ -108,9 +108,9 @@ def _visuals() -> tuple[Box, ...]:
         steps = [0.2 + 0.8 * i / 9 for i in range(10)]
         shapes += [Box((0.026, 0.026, 0.018), (share * x, share * y, 0.0), color) for share in steps]
         shapes.append(Box((0.03, 0.03, 0.04), (x, y, 0.01), _DARK))
-        for i in range(STRIPS):
-            aside = ROTOR_RADIUS * ((2 * i + 1) / STRIPS - 1)
-            size = (2 * math.sqrt(ROTOR_RADIUS**2 - aside**2), 2 * ROTOR_RADIUS / STRIPS, 0.004)
+        for i in range(DISC_STRIPS):
+            aside = ROTOR_RADIUS * ((2 * i + 1) / DISC_STRIPS - 1)
+            size = (2 * math.sqrt(ROTOR_RADIUS**2 - aside**2), 2 * ROTOR_RADIUS / DISC_STRIPS, 0.004)
             shapes.append(Box(size, (x, y + aside, 0.035), _BLADE))
     for x in (-0.08, 0.08):  # skids
         for y in (-0.08, 0.08):

@@ -19,7 +19,7 @@ PLANES = {"XZ": (0, 2), "YZ": (1, 2), "XY": (0, 1)}
 WIDTH = 400
 AZIMUTH, ELEVATION = math.radians(-60.0), math.radians(28.0)  # rad, of the camera
 GRID = 0.5  # m, spacing of the floor's grid
-STRIDE = 4  # stored samples per drawn point: a path needs fewer than a signal
+SAMPLE_STRIDE = 4  # stored samples per drawn point: a path needs fewer than a signal
 
 
 _CASCADE: tuple[Block, ...] = (
@@ -56,9 +56,9 @@ def reference(_kwargs: Mapping[str, Any]) -> dict[str, list[str]]:
 def figures(episode: Episode) -> list[str]:
     """Return figures of the infinity path in three dimensions and of its projections."""
     shown = styles(episode.signals)
-    paths = {name: signals.fields["position"][::STRIDE] for name, signals in episode.signals.items()}
+    paths = {name: signals.fields["position"][::SAMPLE_STRIDE] for name, signals in episode.signals.items()}
     longest = max(episode.signals.values(), key=lambda signals: len(signals.time))
-    wanted = longest.fields["position_ref"][::STRIDE]
+    wanted = longest.fields["position_ref"][::SAMPLE_STRIDE]
     charts = {"3D": _space(paths, wanted)}
     for plane, (i, j) in PLANES.items():
         everything = np.concatenate([wanted, *paths.values()])

@@ -28,8 +28,8 @@ DEFAULT_DISTURBANCES: dict[str, Any] = {
     "ground_effect": 1.0,
 }
 
-VOLUME = 3.0  # m, bound of x and y on either side of the start, and of the height
-TUMBLING = 30.0  # rad/s, bound of the body rates' norm
+FLIGHT_BOUND = 3.0  # m, bound of x and y on either side of the start, and of the height
+MAX_SPIN = 30.0  # rad/s, bound of the body rates' norm
 GROUND_HEIGHT = 0.1  # m, of the vehicle's origin when the skids touch the ground
 MAX_RATE = 1000.0  # rad/s, bound of observed body rates
 MAX_SPEED = 100.0  # m/s, bound of observed velocities
@@ -153,9 +153,9 @@ A flight of 70 s without an error earns a little under 280.
 At rest and level at the path's start, in equilibrium with the payload and with steady-state thrusts.
 
 ## End
-*Terminated* by a crash, with the reason in `info`: `fell_ground` (the vehicle's origin lower
-than {GROUND_HEIGHT:g} m), `fell_inverted` (tilt above 90 degrees) or `fell_bounds` (x or y beyond {VOLUME:g} m, z above
-{VOLUME:g} m, or turning faster than {TUMBLING:g} rad/s). *Truncated* after `duration`.
+*Terminated* by a crash, with the reason in `info`: `fell_ground` (the vehicle's origin below {GROUND_HEIGHT:g} m),
+`fell_inverted` (tilt above 90 degrees) or `fell_bounds` (x or y beyond {FLIGHT_BOUND:g} m, z above {FLIGHT_BOUND:g} m,
+or body rates with a norm above {MAX_SPIN:g} rad/s). *Truncated* after `duration`.
 
 ## Physics
 Vehicle of {robot.MASS:g} kg with linear drag of {robot.DRAG:g} N s/m against the air; see `artde_gym.robots.q450`. Wind
@@ -215,7 +215,7 @@ def falls(position: Vector3[Number], up: Number, spin: Number) -> tuple[Any, Any
     `up` is as in `reward_terms`, `spin` the squared norm of the body rates (rad^2/s^2).
     """
     x, y, z = position
-    inside = (abs(x) <= VOLUME) & (abs(y) <= VOLUME) & (z <= VOLUME) & (spin <= TUMBLING**2)
+    inside = (abs(x) <= FLIGHT_BOUND) & (abs(y) <= FLIGHT_BOUND) & (z <= FLIGHT_BOUND) & (spin <= MAX_SPIN**2)
     return z < GROUND_HEIGHT, up < 0.0, inside ^ True
 
 
