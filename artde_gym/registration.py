@@ -78,7 +78,7 @@ def register_controller(
             raise UnknownNameError(field, point, '"module:function"')
     spec = ControllerSpec(name, entry_point, dict(kwargs), text, tuning_space)
     if _brought.get(name, spec) != spec:
-        raise OptionError("name of a controller", name, f"a new name; these are taken: {', '.join(sorted(_brought))}")
+        raise OptionError("name of a controller", name, f"any name except {', '.join(sorted(_brought))}")
     register_spec(spec)
 
 

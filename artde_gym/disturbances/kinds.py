@@ -389,7 +389,7 @@ def register_disturbance(kind: DisturbanceSpec, effect: Effect, *, replace: bool
         OptionError: if its name is taken and `replace` is not given, or belongs to this project.
     """
     if kind.name in OWN:
-        raise OptionError("disturbance", kind.name, f"a new name; these are taken: {', '.join(OWN)}")
+        raise OptionError("disturbance", kind.name, f"a name that is not taken, any except {', '.join(OWN)}")
     DISTURBANCES.register(kind.name, dataclasses.replace(kind, effect=effect), replace=replace)
 
 

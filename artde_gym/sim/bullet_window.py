@@ -51,16 +51,16 @@ def require_window() -> None:
     where = os.environ.get("DISPLAY")
     if not where:
         raise OptionError(
-            "display", None, "one that shows OpenGL 3 (DISPLAY is not set here); `artde-gym video` needs none"
+            "display", None, "a display with OpenGL 3 (DISPLAY is not set); `artde-gym video` works without one"
         )
     try:
         done = subprocess.run([sys.executable, "-c", _PROBE], capture_output=True, text=True, timeout=PATIENCE)
     except subprocess.TimeoutExpired as error:
-        raise OptionError("display", where, f"one on which a window opens within {PATIENCE:g} s") from error
+        raise OptionError("display", where, f"a display on which a window opens within {PATIENCE:g} s") from error
     if done.returncode:
         said = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
         why = said[-1].strip() if said else f"exit code {done.returncode}"
-        raise OptionError("display", where, f"one that shows OpenGL 3 (here: {why}); `artde-gym video` needs none")
+        raise OptionError("display", where, f"a display with OpenGL 3 ({why}); `artde-gym video` works without one")
 
 
 class BulletWindow:

@@ -54,7 +54,9 @@ class MujocoWindow:
         if self._window is None:
             why = errors[-1] if errors else "GLFW reports no reason"
             raise OptionError(
-                "display", os.environ.get("DISPLAY"), f"one that shows OpenGL ({why}); `artde-gym video` needs none"
+                "display",
+                os.environ.get("DISPLAY"),
+                f"a display with OpenGL ({why}); `artde-gym video` works without one",
             )
         glfw.make_context_current(self._window)
         glfw.swap_interval(0)
