@@ -42,7 +42,7 @@ CLAIMS: tuple[Claim, ...] = (
     *(
         Claim(
             name,
-            "adaptation adds to the equivalent extra stiffness (ARTDE against tde+kd)",
+            "adaptation improves on the equivalent extra stiffness (ARTDE against tde+kd)",
             "ours",
             adapts(name, "tde+kd", "rmse_deg"),
             ablation=True,

@@ -60,7 +60,7 @@ CLAIMS: tuple[Claim, ...] = (
     *(
         Claim(
             name,
-            f"adaptation adds to {what} in wind (ARTDE against {rival})",
+            f"adaptation improves on {what} in wind (ARTDE against {rival})",
             "ours",
             adapts(name, rival, "rmse_m"),
             ablation=rival == "tde+kd",
@@ -70,7 +70,7 @@ CLAIMS: tuple[Claim, ...] = (
     ),
     Claim(
         "Q1-calm",
-        "ARTDE is better than ATDE, and ATDE than TDE, without wind too",
+        "ARTDE is better than ATDE, and ATDE than TDE, also without wind",
         "ours",
         ordered("Q1-calm", ("artde", "atde", "tde"), "rmse_m"),
     ),
