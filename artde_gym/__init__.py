@@ -1,4 +1,4 @@
-"""Gymnasium environments and evaluation for time-delay control: TDE, ATDE, ARTDE and their rivals."""
+"""Gymnasium environments and evaluation for time-delay control: TDE, ATDE, ARTDE and baselines."""
 
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any

@@ -1,4 +1,4 @@
-"""Checks of what a user gives, whatever its type, each an error of ours."""
+"""Validation of user input of any type; each failure raises an `ArtdeGymError`."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from artde_gym.errors import ActionError, ArtdeGymError, OptionError, UnknownArg
 Owner = TypeVar("Owner")
 Arguments = ParamSpec("Arguments")
 
-NUMERIC = "biufO"  # kinds of arrays that hold real numbers; objects are tried one by one
+NUMERIC_KINDS = "biufO"  # array kinds that can hold real numbers; objects are converted one by one
 
 NAME_BYTES = 200
-"""Of a name that is a part of a file's: file systems take 255, and a number, an ending and what is added come to it."""
+"""Longest name within a file name: file systems allow 255 bytes, less a number, a suffix and an extension."""
 
 
 def check_number(field: str, value: Any, low: float, high: float, allowed: str) -> float:
-    """The value as a float, if it is a number from `low` to `high`.
+    """Return the value as a float if it is a number from `low` to `high`.
 
     Raises:
-        OptionError: if it is not; `allowed` says what is.
+        OptionError: if it is not; `allowed` describes valid values.
     """
     real = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
     if not (real and low <= value <= high):  # nan fails both comparisons
@@ -38,7 +38,7 @@ def check_number(field: str, value: Any, low: float, high: float, allowed: str) 
 
 
 def check_integer(field: str, value: Any, low: int, high: int | None = None) -> int:
-    """The value as an int, if it is a whole number from `low` to `high`; None for no upper end.
+    """Return the value as an int if it is a whole number from `low` to `high` (None: no upper bound).
 
     Raises:
         OptionError: if it is not.
@@ -52,7 +52,7 @@ def check_integer(field: str, value: Any, low: int, high: int | None = None) -> 
 
 
 def check_choice(field: str, value: object, known: Collection[str]) -> str:
-    """The value, if it is one of the known words.
+    """Return the value if it is one of the known choices.
 
     Raises:
         OptionError: if it is not.
@@ -63,7 +63,7 @@ def check_choice(field: str, value: object, known: Collection[str]) -> str:
 
 
 def check_bool(field: str, value: object) -> bool:
-    """The value, if it is a truth value.
+    """Return the value as a bool if it is a Boolean.
 
     Raises:
         OptionError: if it is not.
@@ -74,15 +74,15 @@ def check_bool(field: str, value: object) -> bool:
 
 
 def action_array(action: Any, size: int, allowed: str) -> NDArray[np.float64]:
-    """An action (size,) as floats.
+    """Return an action (size,) as floats.
 
     Raises:
-        ActionError: for a wrong shape, or a value that is no finite number; `allowed` says what is.
+        ActionError: for a wrong shape or a value that is not a finite number; `allowed` describes valid values.
     """
     values = real_array("action", action, f"{size} numbers")
     if values.shape != (size,):
         raise ActionError("shape of the action", values.shape, f"({size},)")
-    if not all(map(math.isfinite, values.tolist())):  # of few numbers faster than NumPy's
+    if not all(map(math.isfinite, values.tolist())):  # faster than NumPy for few numbers
         raise ActionError("action", values.tolist(), f"finite {allowed}")
     return values
 
@@ -97,11 +97,11 @@ def real_array(
     """Copy real numbers of any type into an array.
 
     Raises:
-        ActionError: for anything else, complex numbers and words of digits included; `allowed` says what is.
+        ActionError: for anything else, including complex numbers and strings; `allowed` describes valid values.
     """
     try:
         given = np.asarray(value)
-        if given.dtype.kind not in NUMERIC:
+        if given.dtype.kind not in NUMERIC_KINDS:
             raise TypeError(f"values of type {given.dtype}")
         return np.array(given, dtype=dtype, order=order)
     except (
@@ -114,7 +114,7 @@ def real_array(
 
 
 def check_seed(field: str, value: Any) -> int | None:
-    """The value as a seed, if it is a whole number >= 0 of any type, an array of no dimension included, or None.
+    """Return the value as a seed if it is None or a whole number >= 0 of any type, including a 0-d array.
 
     Raises:
         OptionError: if it is not.
@@ -131,7 +131,7 @@ def check_seed(field: str, value: Any) -> int | None:
 def known_arguments(
     initialize: Callable[Concatenate[Owner, Arguments], None],
 ) -> Callable[Concatenate[Owner, Arguments], None]:
-    """Decorate an `__init__` so that an unknown keyword raises `UnknownArgumentError` with the one that was meant."""
+    """Decorate an `__init__` so that an unknown keyword raises `UnknownArgumentError` with a suggestion."""
     _, *known = inspect.signature(initialize).parameters
 
     @functools.wraps(initialize)
@@ -145,7 +145,7 @@ def known_arguments(
 
 
 def check_file_name(field: str, value: object) -> str:
-    """The value, if it is a word that can name a file in a folder of ours, and nothing outside.
+    """Return the value if it is a valid file name that cannot leave its folder.
 
     Raises:
         OptionError: if it is not.
@@ -161,9 +161,9 @@ def check_file_name(field: str, value: object) -> str:
 
 @contextlib.contextmanager
 def wrap_read_errors(field: str, path: Path, allowed: str, kind: type[ArtdeGymError]) -> Iterator[None]:
-    """What goes wrong inside, while a file is read that may be anybody's, becomes an error of the given kind.
+    """Convert every exception raised while an untrusted file is read to an error of the given kind.
 
-    Everything, since damaged files make libraries raise almost anything: zlib.error, RecursionError, MemoryError, ...
+    Damaged files make libraries raise almost anything: zlib.error, RecursionError, MemoryError, ...
     """
     try:
         yield
@@ -174,10 +174,10 @@ def wrap_read_errors(field: str, path: Path, allowed: str, kind: type[ArtdeGymEr
 
 
 def steps_per_period(control_period: float, step: float) -> int:
-    """How many steps of `step` (s) make a control period.
+    """Return the number of steps of `step` (s) in a control period.
 
     Raises:
-        OptionError: unless it is a whole number, and the period 0.05 s at most.
+        OptionError: unless that is a whole number and the period is at most 0.05 s.
     """
     allowed = f"whole multiples of {step} s up to 0.05 s"
     period = check_number("control_period", control_period, 0.0, 0.05 + 0.5 * step, allowed)

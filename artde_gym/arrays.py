@@ -1,4 +1,4 @@
-"""The one array type of this project's signatures; shapes and units are in the docstrings."""
+"""The array type of all signatures; shapes and units are in the docstrings."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Array: TypeAlias = NDArray[np.floating[Any]]
 
 
 def vectorize(function: Callable[..., float]) -> Callable[..., Array]:
-    """A function of numbers as one of arrays (n,): for those of `math`, since NumPy's own round otherwise."""
+    """Apply a scalar function, such as those of `math`, to arrays (n,); NumPy's own functions round differently."""
 
     def mapped(*arrays: Array) -> Array:
         return np.fromiter(map(function, *(array.tolist() for array in arrays)), np.float64, len(arrays[0]))
@@ -23,5 +23,5 @@ def vectorize(function: Callable[..., float]) -> Callable[..., Array]:
 
 
 def total(values: Iterable[float]) -> float:
-    """Add numbers from left to right, as a batch does: since Python 3.12, `sum` corrects the last bit."""
+    """Add numbers from left to right, as a batch does; since Python 3.12, `sum` compensates rounding errors."""
     return functools.reduce(operator.add, values, 0.0)

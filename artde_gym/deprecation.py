@@ -1,7 +1,7 @@
-"""Old names, which keep working for one release with a `DeprecationWarning`: all of them in tables, here alone.
+"""Deprecated names, which keep working for one release with a `DeprecationWarning`.
 
-Modules and what is in them, keyword arguments, disturbances and their parameters, and what stored files call things.
-Files are read without a warning: nobody can edit what an earlier release has written.
+The tables list modules and their contents, keyword arguments, disturbances and their parameters, and names in stored
+files. Files are read without a warning: an earlier release wrote them, and users cannot edit them.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ MODULES: dict[str, str] = {
     "controllers.checkup": "controllers.stability_check",
     "controllers.laws.validity": "controllers.laws.stability",
 }
-"""Old module -> where its contents are now."""
+"""Old module -> new module."""
 
 NAMES: dict[str, dict[str, str]] = {
     "artde_gym.disturbances": {"KINDS": "DISTURBANCES", "Kind": "DisturbanceSpec"},
@@ -89,39 +89,39 @@ NAMES: dict[str, dict[str, str]] = {
     "controllers.robots": {"search_space": "tuning_space"},
     "controllers.stability_check": {"validity": "stability"},
 }
-"""Module -> old name of something in it -> its name now."""
+"""Module -> old name in it -> new name."""
 
 DISTURBANCES = {
     "actuator_loss": "actuator_effectiveness",
     "mass_error": "mass_scale",
     "torque_delay": "action_delay",
 }
-"""Old kind of a disturbance -> its name now."""
+"""Old kind of a disturbance -> new name."""
 PARAMETERS = {
     "action_delay": {"samples": "steps"},
     "payload": {"attach": "attach_time", "drop": "detach_time"},
     "wind": {"fan_place": "fan_position"},
 }
-"""Kind of a disturbance -> old parameter -> its name now."""
+"""Kind of a disturbance -> old parameter -> new name."""
 FIELDS = {"traced": "record_episodes", "trace_hz": "record_hz"}
-"""Old argument of `evaluate`, `frontier` and `tune`, also in the records of their folders -> its name now."""
+"""Old argument of `evaluate`, `frontier` and `tune`, also in their stored configurations -> new name."""
 RESIDUAL = {"channel": "action_mode", "hold": "decision_period", "limit": "action_scale"}
-"""Old field of a residual, also in files of policies -> its name now."""
+"""Old field of a residual, also in stored policies -> new name."""
 GROUPS = {"artde_gym.agents": "artde_gym.couplings"}
-"""Group of entry points -> its old name."""
+"""Group of entry points -> old name."""
 
 
 def warn(old: str, new: str) -> None:
-    """Tell the user's own code, which lies above this project's, to use the new name."""
+    """Warn of an old name; the warning points at the caller's caller."""
     warnings.warn(f"{old} is deprecated; use {new}", DeprecationWarning, stacklevel=3)
 
 
 def moved(module: str, names: Mapping[str, str]) -> Callable[[str], Any]:
-    """Return a module's `__getattr__` (PEP 562) for names that another module holds now.
+    """Return a module's `__getattr__` (PEP 562) for names that have moved to another module.
 
     Args:
-        module: that had them.
-        names: name -> module that has it.
+        module: module that had them.
+        names: name -> module that has it now.
     """
 
     def look_up(name: str) -> Any:
@@ -134,11 +134,11 @@ def moved(module: str, names: Mapping[str, str]) -> Callable[[str], Any]:
 
 
 def renamed_arguments(names: Mapping[str, str], values: Mapping[Any, Any] | None = None) -> Callable[[T], T]:
-    """Decorate a function, or a class, so that it takes old keyword arguments too.
+    """Decorate a function or a class so that it also takes old keyword arguments.
 
     Args:
-        names: old argument -> its name now.
-        values: old value -> its value now, of the arguments that took one of these.
+        names: old argument -> new name.
+        values: old value -> new value of these arguments.
     """
 
     def decorate(target: T) -> T:
@@ -162,11 +162,11 @@ def renamed_arguments(names: Mapping[str, str], values: Mapping[Any, Any] | None
 
 
 takes_old_names = renamed_arguments({**FIELDS, "backend": "vectorized"}, {"single": False, "batch": True})
-"""Decorates what takes the arguments of `evaluate`."""
+"""Decorator for functions that take the arguments of `evaluate`."""
 
 
 def current_path(path: str) -> str:
-    """Return "kind.parameter", or longer paths with such an end, under the names of now; other paths as they are."""
+    """Return a path "kind.parameter..." with current names; other paths are unchanged."""
     head, *rest = path.split(".")
     kind = DISTURBANCES.get(head, head)
     names = PARAMETERS.get(kind, {})
@@ -174,17 +174,17 @@ def current_path(path: str) -> str:
 
 
 def current_column(column: str) -> str:
-    """Return the name that a column of a table of episodes has now."""
+    """Return the current name of a column of an episode table."""
     head, dot, path = column.partition(".")
     return f"{head}.{current_path(path)}" if dot and head in ("disturbance", "disturbances") else column
 
 
 def current_disturbances(given: Any, *, told: bool = False) -> Any:
-    """Return disturbances as the grammar has them now; what is no mapping of kinds comes back as it is.
+    """Return disturbances with the current names of the grammar; anything but a mapping is returned unchanged.
 
     Args:
-        given: as a user or a file wrote them.
-        told: whether old names are warned of.
+        given: disturbances from a user or a file.
+        told: True to warn of old names.
     """
     if not isinstance(given, Mapping):
         return given
@@ -192,7 +192,7 @@ def current_disturbances(given: Any, *, told: bool = False) -> Any:
     for old, value in given.items():
         kind = DISTURBANCES.get(old, old) if isinstance(old, str) else old
         if kind != old and kind in given:
-            raise DisturbanceError("disturbances", old, f"{kind!r} alone, which is its name now")
+            raise DisturbanceError("disturbances", old, f"only {kind!r}, its new name")
         if told and kind != old:
             warn(f"disturbance {old!r}", repr(kind))
         entries = value if isinstance(value, list) else [value]
@@ -207,19 +207,19 @@ def _current_entry(kind: Any, entry: Any, told: bool) -> Any:
         return entry
     for old in names.keys() & entry.keys():
         if names[old] in entry:
-            raise DisturbanceError(kind, old, f"{names[old]!r} alone, which is its name now")
+            raise DisturbanceError(kind, old, f"only {names[old]!r}, its new name")
         if told:
             warn(f"parameter {old!r} of the disturbance {kind!r}", repr(names[old]))
     return {names.get(key, key): value for key, value in entry.items()}
 
 
 def current_residual(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a residual from a file under the names of now."""
+    """Return the fields of a stored residual under their current names."""
     return {RESIDUAL.get(name, name): value for name, value in fields.items()}
 
 
 def current_configuration(stored: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the configuration that a results folder was written with under the names of now."""
+    """Return the stored configuration of a results folder under current names."""
     found: dict[str, Any] = {}
     for field, value in stored.items():
         if field == "backend":
@@ -239,7 +239,7 @@ def current_configuration(stored: Mapping[str, Any]) -> dict[str, Any]:
 
 
 class _OldNames(importlib.abc.Loader):
-    """Loads a module of `NAMES` as `loader` does, and lets it answer to the old names of what is in it."""
+    """A wrapper of `loader` that adds the old names of `NAMES` to a module."""
 
     def __init__(self, loader: importlib.abc.Loader) -> None:
         self._loader = loader
@@ -256,7 +256,7 @@ class _OldNames(importlib.abc.Loader):
 
 
 def _answer_old_names(module: ModuleType) -> None:
-    """Let a module of `NAMES` answer to the old names of what is in it (PEP 562)."""
+    """Add the old names of `NAMES` to a module (PEP 562)."""
     names = NAMES[module.__name__]
 
     def look_up(name: str) -> Any:
@@ -269,7 +269,7 @@ def _answer_old_names(module: ModuleType) -> None:
 
 
 class _OldModules(importlib.abc.MetaPathFinder, importlib.abc.Loader):
-    """Finds the modules of `MODULES` under their old names, with the contents of the new ones, and those of `NAMES`."""
+    """An import hook for the old modules of `MODULES` and the old names of `NAMES`."""
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
@@ -293,8 +293,8 @@ class _OldModules(importlib.abc.MetaPathFinder, importlib.abc.Loader):
 
 
 def find_old_modules() -> None:
-    """Make old modules, and old names in modules, importable; called once, by `import artde_gym`."""
+    """Make old modules and old names in modules importable; called once, by `import artde_gym`."""
     if not any(isinstance(finder, _OldModules) for finder in sys.meta_path):
         for name in NAMES.keys() & sys.modules.keys():
             _answer_old_names(sys.modules[name])
-        sys.meta_path.insert(0, _OldModules())  # before the one that would load the modules of `NAMES`
+        sys.meta_path.insert(0, _OldModules())  # before the finder that would load the modules of `NAMES`

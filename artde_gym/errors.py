@@ -1,4 +1,4 @@
-"""The errors that a user of artde-gym can cause and mend: each names the field, the value and what is allowed."""
+"""Errors that a user can cause and fix; each names the field, the value and what is allowed."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ class ArtdeGymError(ValueError):
     """`field` has a `value` that is not `allowed`."""
 
     def __init__(self, field: str, value: object, allowed: str) -> None:
-        super().__init__(field, value, allowed)  # exactly the arguments, so that workers can pickle it
+        super().__init__(field, value, allowed)  # the same arguments, so that workers can pickle it
         self.field, self.value, self.allowed = field, value, allowed
 
     def __str__(self) -> str:
@@ -18,18 +18,18 @@ class ArtdeGymError(ValueError):
 
 
 class RobotError(ArtdeGymError):
-    """A robot description that no engine could build."""
+    """A robot description that no engine can build."""
 
 
 class OptionError(ArtdeGymError):
-    """An argument of an environment, of `reset(options=...)` or of an evaluation."""
+    """An invalid argument of an environment, of `reset(options=...)` or of an evaluation."""
 
 
 class UnknownArgumentError(OptionError, TypeError):
     """A keyword argument that an environment does not take.
 
-    Also a `TypeError`, as Python raises it, since clients try arguments of other libraries' and look out for that.
-    `gymnasium.make` raises it again with a text of its own, which is then the `field`.
+    Also a `TypeError`, as in Python, since libraries try optional arguments and catch that.
+    `gymnasium.make` re-raises it with its own message as the only argument, which becomes the `field`.
     """
 
     def __init__(self, field: str, value: object = None, allowed: str = "") -> None:
@@ -42,22 +42,22 @@ class UnknownArgumentError(OptionError, TypeError):
 
 
 class MissingDependencyError(OptionError):
-    """An argument that needs a package which this Python does not have; `allowed` says what to do."""
+    """An argument that needs a package that is not installed; `allowed` says what to do."""
 
     def __str__(self) -> str:
         return f"{self.field} {self.value!r} is not available: {self.allowed}"
 
 
 class ActionError(ArtdeGymError):
-    """An action of the wrong shape, or with a value that is not finite."""
+    """An action with the wrong shape or a value that is not finite."""
 
 
 class DisturbanceError(ArtdeGymError):
-    """A disturbance outside the grammar of `artde_gym.disturbances`."""
+    """A disturbance that violates the grammar of `artde_gym.disturbances`."""
 
 
 class UnknownNameError(ArtdeGymError):
-    """A name that no registry knows: a scenario, a controller, an environment."""
+    """An unknown name of a scenario, a controller, an environment or another registered entry."""
 
 
 class StoreError(ArtdeGymError):
@@ -65,11 +65,11 @@ class StoreError(ArtdeGymError):
 
 
 class WorkerError(ArtdeGymError):
-    """Worker processes that end before their work is done."""
+    """Worker processes that ended before their work was done."""
 
 
 def suggest_names(name: object, known: Collection[str]) -> str:
-    """The known names as a sentence, the likely meant one pointed out."""
+    """Return the known names as one text, with the closest match as a suggestion."""
     close = difflib.get_close_matches(str(name), known, n=1)
     hint = f" (did you mean {close[0]!r}?)" if close else ""
     return ", ".join(sorted(known)) + hint

@@ -1,14 +1,14 @@
-"""The `info` of environments: numbers and arrays alone, with the same keys after `reset` and after `step`.
+"""The `info` of environments: only numbers and arrays, with the same keys after `reset` and `step`.
 
 | key | value |
 |---|---|
 | `time_s` | time since the start of the episode (s) |
 | `reward_*` | each term of the reward; zeros after `reset` |
-| `disturbance.*` | what was sampled for the episode, by kind and parameter; see `artde_gym.disturbances.numeric` |
-| `push_begins`, `push_ends`, `payload_attached`, `payload_dropped` | how often it happened in the last control period |
-| `fell_*` | true for the one reason for which the episode was terminated |
+| `disturbance.*` | sampled values of the episode, by kind and parameter; see `artde_gym.disturbances.numeric` |
+| `push_begins`, `push_ends`, `payload_attached`, `payload_dropped` | number of events in the last control period |
+| `fell_*` | true for the one reason why the episode was terminated |
 
-In a vector environment each entry `x` has a mask `_x` (n,) beside it, as Gymnasium has it.
+In a vector environment each entry `x` has a mask `_x` (n,), as usual in Gymnasium.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from artde_gym.disturbances.schedule import EVENTS
 
 Mask = NDArray[np.bool_]
 Columns = dict[str, NDArray[Any]]
-"""Entries of `info`, one value an environment."""
+"""Entries of `info`, one value per environment."""
 
-REWARD, FELL = "reward_", "fell_"  # in front of names
+REWARD, FELL = "reward_", "fell_"  # prefixes of names
 
 
 class EpisodeInfo:
-    """The `info` of one environment: what does not change within an episode is prepared once.
+    """The `info` of one environment, with everything constant within an episode prepared once.
 
-    Each `info` is a new dictionary of new arrays, so that no caller can reach another one.
+    Each `info` is a new dictionary of new arrays, so that callers cannot change each other's.
     """
 
     def __init__(self, numbers: Mapping[str, Any], reasons: Sequence[str]) -> None:
@@ -42,7 +42,7 @@ class EpisodeInfo:
     def told(
         self, time: float, terms: Mapping[str, float], events: Sequence[str] = (), falls: Sequence[bool] = ()
     ) -> dict[str, Any]:
-        """Tell of a step: terms of the reward, what began or ended, and which reasons of a fall hold."""
+        """Return the `info` of a step from the terms of the reward, the events and which reasons for a fall hold."""
         info = self._still.copy()
         info["time_s"] = time
         for name, term in terms.items():
@@ -57,11 +57,11 @@ class EpisodeInfo:
 
 
 def fall_reason(info: Mapping[str, Any], robot: int | None = None) -> str:
-    """Name the reason for which an episode was terminated, "" if it was not.
+    """Return the reason why an episode was terminated, "" if it was not.
 
     Args:
-        info: of a step.
-        robot: number of the environment, where `info` is a vector environment's.
+        info: `info` of a step.
+        robot: index of the environment if `info` is from a vector environment.
     """
     for name, held in info.items():
         if name.startswith(FELL) and (held if robot is None else held[robot]):
@@ -70,12 +70,12 @@ def fall_reason(info: Mapping[str, Any], robot: int | None = None) -> str:
 
 
 def prefixed(prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Put a prefix before each name."""
+    """Prefix each name."""
     return {prefix + name: value for name, value in values.items()}
 
 
 def masked(values: Mapping[str, Any], mask: Mask) -> dict[str, Any]:
-    """Put a mask beside each entry; masks that are there become narrower."""
+    """Add a mask to each entry; existing masks are combined with it."""
     told: dict[str, Any] = {}
     for name, value in values.items():
         if name[:1] != "_":
@@ -86,26 +86,26 @@ def masked(values: Mapping[str, Any], mask: Mask) -> dict[str, Any]:
 
 
 def cleared(values: Mapping[str, NDArray[Any]], where: Mask) -> Columns:
-    """Put zeros into arrays (n,) in some environments; new arrays, if there are any."""
+    """Zero arrays (n,) in some environments; the arrays are new if there are any such environments."""
     if not where.any():
         return dict(values)
     return {name: np.where(where, np.zeros((), value.dtype), value) for name, value in values.items()}
 
 
 class SampledTable:
-    """What was sampled for each of `n` environments, as arrays with masks.
+    """The values sampled for each of `n` environments, as arrays with masks.
 
-    Lists of different lengths, as different disturbances in one vector may have, are filled up with zeros.
+    Lists of different lengths are padded with zeros.
     """
 
     def __init__(self, n: int) -> None:
         self._n = n
         self._columns: Columns = {}
         self._known: dict[str, Mask] = {}
-        self._told: list[tuple[str, NDArray[Any], Mask | None]] = []  # mask: None where all have the entry
+        self._told: list[tuple[str, NDArray[Any], Mask | None]] = []  # mask None: all environments have the entry
 
     def enter(self, rows: Mapping[int, Mapping[str, Any]]) -> None:
-        """Replace what some environments had."""
+        """Replace the values of some environments."""
         for row, numbers in rows.items():
             self._enter(row, numbers)
         self._told = [
@@ -115,7 +115,7 @@ class SampledTable:
         ]
 
     def told(self) -> dict[str, Any]:
-        """All that is known, as new arrays, for `masked`, which makes new masks."""
+        """Return all values as new arrays for `masked`, which makes new masks."""
         told: dict[str, Any] = {}
         for name, column, known in self._told:
             told[name] = column.copy()
@@ -134,7 +134,7 @@ class SampledTable:
             column[(row, *map(slice, cell.shape))] = cell
 
     def _fitted(self, column: NDArray[Any] | None, cell: NDArray[Any]) -> NDArray[Any]:
-        """The column, with room for a cell."""
+        """Return the column, enlarged to fit a cell."""
         if column is None:
             return np.zeros((self._n, *cell.shape), cell.dtype)
         wider = [(0, 0), *((0, max(0, new - old)) for old, new in zip(column.shape[1:], cell.shape, strict=True))]

@@ -1,12 +1,12 @@
-"""Everything that the project knows of a robot, as one frozen object that a plug-in brings.
+"""Robot plug-ins: everything the project knows about a robot, in one frozen object.
 
-A robot is three objects, one for each package, found by three groups of entry points under the robot's name:
+A robot is up to three objects, one per package, found by entry points with the robot's name in three groups:
 
-    artde_gym.robots     `RobotKit`: its model, environments, disturbances, scenarios, and how it is shown
-    artde_gym.drives     `controllers.drive.Drive`: which policies drive it, at which gains
-    artde_gym.agents  `baselines.agent.Agent`: how a learned residual acts on it, and what it is trained on
+    artde_gym.robots  `RobotKit`: model, environments, disturbances, scenarios and presentation
+    artde_gym.drives  `controllers.drive.Drive`: its policies and their gains
+    artde_gym.agents  `baselines.agent.Agent`: how a learned residual acts on it and its training tasks
 
-Only the first one is needed; without the others, a robot has the joint-space laws without presets, and residuals on
+Only the first is required; without the others, a robot has the joint-space laws without presets, and residuals on
 joint accelerations.
 """
 
@@ -24,17 +24,17 @@ Capability = Literal[
     "actuators", "armature", "contact", "effects", "encoders", "feet", "flight", "joints", "legs", "mass", "payload",
     "rotors", "sensors", "sites", "torque_limit",
 ]  # fmt: skip
-"""Properties of a robot, and of its environments, that kinds of disturbances ask for.
+"""Properties of a robot and its environments that kinds of disturbances require.
 
-"effects" are those of registered kinds: the environments apply `artde_gym.disturbances.effects.Effects`.
+"effects": the environments apply registered kinds through `artde_gym.disturbances.effects.Effects`.
 """
 Harder = Literal["larger", "smaller"]
 
 
 class Environment(NamedTuple):
-    """An environment as Gymnasium registers it; entry points are "module:class".
+    """An environment to be registered with Gymnasium; entry points are "module:class".
 
-    `main` names the scenarios that `artde-gym evaluate` runs in it where none is asked for.
+    `main` names the scenarios that `artde-gym evaluate` runs in it by default.
     """
 
     env_id: str
@@ -44,9 +44,9 @@ class Environment(NamedTuple):
 
 
 class Range(NamedTuple):
-    """Ends and grid of a path where the user gives none, and which of its ends is the hard one.
+    """Default bounds and tolerance of a path, and which of its ends is harder.
 
-    `duration` (s) is that of the test where it is not the robot's usual one.
+    `duration` (s) replaces the robot's usual duration of the test.
     """
 
     low: float
@@ -61,12 +61,12 @@ class FrontierTest:
     """The standard test of a robustness frontier.
 
     Attributes:
-        scenario: whose disturbances it has.
-        duration: s.
-        when: (s) between which a varied push comes.
-        repeated: entries of kinds of which a parameter is varied, in place of the scenario's own of that kind.
-        time_step: s, of which control periods are whole multiples.
-        ranges: path -> range. Any other path needs low, high and tolerance.
+        scenario: name of the scenario that supplies the other disturbances.
+        duration: duration of an episode (s).
+        when: earliest and latest time of a varied push (s).
+        repeated: varied entries of kinds that take a list; they replace the scenario's entries of that kind.
+        time_step: physics time step (s); control periods are whole multiples of it.
+        ranges: path -> range; for any other path the user must give low, high and tolerance.
     """
 
     scenario: str
@@ -78,7 +78,7 @@ class FrontierTest:
 
 
 class Motion(NamedTuple):
-    """The undisturbed motion in words, when it has become periodic (s), and its period (s)."""
+    """Name of the undisturbed motion, the time from which it is periodic (s), and its period (s)."""
 
     name: str
     settled: float
@@ -86,23 +86,23 @@ class Motion(NamedTuple):
 
 
 MOTION = Motion("motion", 0.0, 2.0)
-"""Of a robot that says nothing about its own."""
+"""Default for a robot that defines no motion."""
 
 
 class Push(NamedTuple):
-    """The site at which live play pushes, and how hard (N) in the beginning."""
+    """Site and initial force (N) of pushes in live play."""
 
     site: str
     force: float
 
 
 class Reported(NamedTuple):
-    """What a publication reports of a scenario.
+    """Published results of a scenario.
 
     Attributes:
-        table: where.
+        table: table of the publication.
         values: controller -> metric -> axis -> value.
-        time_to_fall: controller -> s.
+        time_to_fall: controller -> time to fall (s).
     """
 
     table: str
@@ -111,7 +111,7 @@ class Reported(NamedTuple):
 
 
 def random_push(site: str, when: tuple[float, float]) -> dict[str, Any]:
-    """Return a push to be varied in size: from any side with equal probability, at a random time (s) of a span."""
+    """Return a push of variable size: from a uniformly random side, at a uniformly random time in a span (s)."""
     return {
         "body": site,
         "magnitude": 0.0,
@@ -127,20 +127,20 @@ class RobotKit:
 
     Attributes:
         name: the `robot_name` of its environments.
-        title: how users call it: "biped".
-        model: builds its nominal model, with `mass` (kg) and `sites` ((name, link, place) each); with
-            `joint_inertia(q)`, reports judge m_bar.
-        joints: names of its joints, or of its rotors, of which "all" is a shorthand.
-        environments: that `import artde_gym` registers.
-        capabilities: by which kinds of disturbances are honored.
-        defaults: "kind.parameter" -> default in place of the kind's own.
-        scenarios: by which it is evaluated.
+        title: the word for it in texts, such as "biped".
+        model: function that builds its nominal model, with `mass` (kg) and `sites` ((name, link, place) each); if the
+            model has `joint_inertia(q)`, reports check m_bar against it.
+        joints: names of its joints or rotors; "all" is a shorthand for them.
+        environments: environments that `import artde_gym` registers.
+        capabilities: properties that decide which kinds of disturbances it supports.
+        defaults: "kind.parameter" -> default that overrides the kind's.
+        scenarios: scenarios of its evaluation.
         reproduced: names of the scenarios that `reproduce` runs, and of the controllers in them.
-        reported: what a publication reports of its scenarios, by their name there (`Scenario.thesis`).
+        reported: published results of its scenarios, by their published name (`Scenario.thesis`).
         frontier: its standard test; None if it has none.
-        motion: that pictures in a report show.
-        push: of live play; None to push at the first site with 10 N.
-        report: module with `reference(kwargs)` and `figures(episode)`, see `artde_gym.report.robot`; None for the
+        motion: motion shown by pictures in a report.
+        push: pushes of live play; None: 10 N at the first site.
+        report: module with `reference(kwargs)` and `figures(episode)`, see `artde_gym.report.robot`; None: only the
             figures that all robots have.
         scene: "module:function" that is called with an environment's arguments and returns the
             `artde_gym.motion.scene.Scene` that replays show; None to make one of a model that is a `RobotSpec`.
@@ -164,7 +164,7 @@ class RobotKit:
 
     @property
     def sites(self) -> tuple[str, ...]:
-        """Names of the places at which it can be pushed."""
+        """Names of the sites that can be pushed."""
         return tuple(name for name, _, _ in self.model().sites)
 
 

@@ -1,4 +1,4 @@
-"""Named fields of a flat observation or action vector: what policies, documentation and plots go by."""
+"""Named fields of a flat observation or action vector, shared by policies, documentation and plots."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from artde_gym.errors import UnknownNameError
 
 @dataclasses.dataclass(frozen=True)
 class Field:
-    """A run of numbers with one meaning.
+    """Consecutive components with one meaning.
 
     Attributes:
-        unit: in SI, "1" for a pure number.
-        low, high: finite, physical bounds: one for each component, or one number for all.
-        text: what it is, frame included.
+        unit: SI unit, "1" if dimensionless.
+        low, high: finite physical bounds: one per component, or one for all.
+        text: description, including the frame.
     """
 
     name: str
@@ -33,13 +33,13 @@ class Field:
 
 @dataclasses.dataclass(frozen=True)
 class Layout:
-    """Fields in the order in which they lie in the vector."""
+    """Fields in their order in the vector."""
 
     fields: tuple[Field, ...]
 
     @functools.cached_property
     def slices(self) -> dict[str, slice]:
-        """Where each field lies in the last axis."""
+        """Slice of each field along the last axis."""
         stops = np.cumsum([field.size for field in self.fields]).tolist()
         return {field.name: slice(stop - field.size, stop) for field, stop in zip(self.fields, stops, strict=True)}
 
@@ -53,11 +53,11 @@ class Layout:
         return self.slices[name]
 
     def split(self, vector: NDArray[Any]) -> dict[str, NDArray[Any]]:
-        """Views of all fields of `vector` (..., size) by name."""
+        """Return views of all fields of `vector` (..., size) by name."""
         return {name: vector[..., part] for name, part in self.slices.items()}
 
     def box(self, dtype: type[np.floating[Any]] | np.dtype[Any] = np.float64) -> Box:
-        """The space with the fields' bounds."""
+        """Return the space with the fields' bounds."""
         low, high = (
             np.concatenate([np.full(field.size, getattr(field, bound), dtype) for field in self.fields])
             for bound in ("low", "high")
@@ -65,7 +65,7 @@ class Layout:
         return Box(low, high, dtype=dtype)
 
     def table(self) -> str:
-        """The fields as a Markdown table."""
+        """Return the fields as a Markdown table."""
         rows = ["| index | field | unit | from | to | meaning |", "|---|---|---|---|---|---|"]
         for field in self.fields:
             part = self.slices[field.name]

@@ -1,4 +1,4 @@
-"""What an environment tracks and what it spends on it, as data: metrics, tables and claims go by it."""
+"""Tracked signals and efforts of an environment, as data for metrics, tables and claims."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ Fields: TypeAlias = Mapping[str, Array]
 
 @dataclasses.dataclass(frozen=True)
 class TrackedSignal:
-    """A vector that is meant to follow its reference.
+    """A vector that should follow its reference.
 
     Attributes:
-        unit: in which errors are reported, as columns spell it.
-        scale: how many of it make one SI unit.
+        unit: unit of reported errors, as spelled in column names.
+        scale: number of these units in one SI unit.
         axes: reported axis -> its component of the error.
         error: observations -> reference - measured (..., n), in SI.
-        diagnostic: the policy's own account of this error, used in its place where a policy has one; errors are then
-            those at its decisions, without the final observation.
+        diagnostic: diagnostic of the policy that replaces this error where it exists; errors are then
+            those at the policy's steps, without the final observation.
     """
 
     unit: str
@@ -38,10 +38,10 @@ class EffortSignal:
     """Forces or torques of one unit.
 
     Attributes:
-        name: as columns spell it.
-        unit: likewise.
-        field: of the observation; its values acted over the control period that ends with the observation.
-        part: components of the field that are of this kind.
+        name: name, as spelled in column names.
+        unit: unit, as spelled in column names.
+        field: field of the observation; its values acted over the control period that ends with the observation.
+        part: components of the field with this unit.
         axes: reported axis -> its component of the part.
     """
 
@@ -63,22 +63,22 @@ class EffortSignal:
 )
 @dataclasses.dataclass(frozen=True)
 class MetricsSpec:
-    """Everything that metrics have to know of an environment.
+    """Everything that metrics need to know about an environment.
 
     Attributes:
-        errors: the first one is what recovery, IAE and ITAE are measured by.
-        norm: whether that one's components make one number by their Euclidean norm (of a vector in space) or by their
-            root mean square (of joints).
+        errors: tracked signals; recovery, IAE and ITAE use the first.
+        norm: reduction of the first signal's components to one number: True for their Euclidean norm (a vector in
+            space), False for their root mean square (joints).
         settling_band: size of error that counts as recovered, in SI.
-        efforts: what was applied.
+        efforts: applied forces and torques.
         power: observations -> power spent (...), W.
         saturated_field: field whose values saturate at its bounds.
-        saturation_margin: share of the field's range that counts as at the bound; a lag approaches it without
-            reaching it.
+        saturation_margin: share of the field's range that counts as saturated; with a lag, values approach the bound
+            without reaching it.
         tde_errors: column -> diagnostic of a policy that is an error of time-delay estimation.
-        diagnostic_means: column -> diagnostic of a policy, one number, whose mean is reported.
-        recorded_info: entries of `info` that belong into an episode's traces too.
-        speed: observations -> speed of travel (...), m/s, where a cost of transport makes sense.
+        diagnostic_means: column -> scalar diagnostic of a policy whose mean is reported.
+        recorded_info: entries of `info` that are recorded in an episode's traces too.
+        speed: observations -> speed of travel (...), m/s; None if a cost of transport makes no sense.
     """
 
     errors: tuple[TrackedSignal, ...]
@@ -95,5 +95,5 @@ class MetricsSpec:
 
     @property
     def diagnosed(self) -> bool:
-        """Whether metrics need a policy's diagnostics at every control period."""
+        """True if metrics need a policy's diagnostics at every control period."""
         return any(tracked.diagnostic is not None for tracked in self.errors)

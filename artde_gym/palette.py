@@ -1,4 +1,4 @@
-"""One look a controller in every figure: colors that color-blind readers can tell apart, and markers for print."""
+"""Style of each controller in all figures: colors that color-blind readers can tell apart, and markers for print."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 
 class Style(NamedTuple):
-    """How a figure draws a controller; both as Matplotlib reads them."""
+    """Color and marker of a controller, in Matplotlib's notation."""
 
     color: str
     marker: str
@@ -24,7 +24,7 @@ STYLES: dict[str, Style] = {
     "pid": Style("#7F7F7F", "X"),
     "computed-torque": Style("#000000", "*"),
 }
-"""Controller -> look. The colors are those of Okabe and Ito, with a gray in place of their yellow."""
+"""Controller -> style. The colors are those of Okabe and Ito, with gray instead of yellow."""
 
 OTHERS: tuple[Style, ...] = (
     Style("#332288", "<"),
@@ -35,13 +35,14 @@ OTHERS: tuple[Style, ...] = (
     Style("#117733", "H"),
     Style("#AA4499", "8"),
 )
-"""For all other names; colors from Tol's "muted" scheme."""
+"""Styles for all other names; colors from Tol's "muted" scheme."""
 
 
 def styles(names: Iterable[str]) -> dict[str, Style]:
-    """A look for each name: its own in `STYLES`, else one of `OTHERS` that depends on the name.
+    """Return a style for each name: its entry in `STYLES`, else one of `OTHERS` chosen by the name.
 
-    Two other names that would get the same look get different ones, as long as there are any left.
+    Two names that would get the same style get different ones while any are left.
+
     """
     chosen: dict[str, Style] = {}
     for name in names:

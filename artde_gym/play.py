@@ -1,4 +1,4 @@
-"""A person in the loop: an episode at the pace of the clock, in which keys push the robot and drop its payload."""
+"""Live play: an episode in real time in which keys push the robot and drop its payload."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from artde_gym.multibody.spec import Vector
 from artde_gym.sim.camera import Camera
 from artde_gym.sim.engine import State
 
-RATE = 30.0  # looks at the keys in a second
-FORCE = 10.0  # N, of a push in the beginning where the robot does not say
-DURATION = 0.2  # s, of a push
-HARDER = 1.25  # by a key
-SLOWER = 2.0  # by a key
-SPEEDS = (1 / 64, 4.0)  # slowest and fastest, simulated over real time
-VIEW = 0.03  # m, that the robot moves before the view goes with it
-ARROW = 0.35  # m, of a push in the window
+RATE = 30.0  # Hz, of polling the keys
+PUSH_FORCE = 10.0  # N, initial force of a push unless the robot's kit sets one
+PUSH_DURATION = 0.2  # s, of a push
+FORCE_FACTOR = 1.25  # per key press
+SPEED_FACTOR = 2.0  # per key press
+SPEED_RANGE = (1 / 64, 4.0)  # slowest and fastest, simulated over real time
+VIEW_SLACK = 0.03  # m, motion of the robot after which the view follows
+ARROW_LENGTH = 0.35  # m, of a push in the window
 
 DIRECTIONS: dict[str, Vector] = {
     "up": (1.0, 0.0, 0.0),
@@ -31,7 +31,7 @@ DIRECTIONS: dict[str, Vector] = {
     "left": (0.0, 1.0, 0.0),
     "right": (0.0, -1.0, 0.0),
 }
-"""Key -> where it pushes: ahead, back, to the robot's left, to its right."""
+"""Key -> direction of its push: forward, backward, to the robot's left, to its right."""
 HELP = (
     "arrows or click: push   + -: harder, softer   d: drop payload",
     ", .: slower, faster   space: pause   r: reset   q: quit",
@@ -39,7 +39,7 @@ HELP = (
 
 
 class Viewer(Protocol):
-    """What a session needs of a window; see `artde_gym.sim.window`."""
+    """The window of a session; see `artde_gym.sim.window`."""
 
     @property
     def open(self) -> bool: ...
@@ -54,29 +54,29 @@ class Viewer(Protocol):
 
 
 class Session:
-    """An environment, a policy and a window.
+    """A live session: an environment, a policy and a window.
 
     Args:
-        env: of this project.
-        policy: that drives it.
-        window: which is looked at for keys and clicks.
-        name: of the policy, to be shown.
-        seed: of the first episode; each reset takes the next one.
+        env: environment of this project.
+        policy: policy that drives it.
+        window: window that shows it and reads keys and clicks.
+        name: displayed name of the policy.
+        seed: seed of the first episode; each reset takes the next one.
 
     Attributes:
-        time_s: simulated, of this episode.
-        fallen: why the robot fell, or "".
-        over: whether the episode has ended.
+        time_s: simulated time of this episode (s).
+        fallen: reason for a fall, or "".
+        over: True once the episode has ended.
         speed: simulated over real time.
-        paused: whether time stands still.
-        force: of a push (N).
+        paused: True while paused.
+        force: force of a push (N).
     """
 
     def __init__(self, env: Any, policy: Policy, window: Viewer, name: str, seed: int = 0) -> None:
         self._env, self._plant, self._policy, self._window, self._name = env, env.unwrapped, policy, window, name
         self._seed = seed
         self._sites: list[str] = [site for site, _, _ in self._plant.nominal_robot.sites]
-        self.site, self.force = ROBOTS[self._plant.robot_name].push or Push(self._sites[0], FORCE)
+        self.site, self.force = ROBOTS[self._plant.robot_name].push or Push(self._sites[0], PUSH_FORCE)
         self.speed, self.paused, self.leaving = 1.0, False, False
         self._actions: dict[str, Callable[[], object]] = {
             "d": self._plant.drop_payload,
@@ -84,18 +84,18 @@ class Session:
             "q": self._leave,
             "escape": self._leave,
             "space": self._pause,
-            ",": lambda: self._pace(1 / SLOWER),
-            ".": lambda: self._pace(SLOWER),
-            "+": lambda: self._strengthen(HARDER),
-            "=": lambda: self._strengthen(HARDER),
-            "-": lambda: self._strengthen(1 / HARDER),
+            ",": lambda: self._pace(1 / SPEED_FACTOR),
+            ".": lambda: self._pace(SPEED_FACTOR),
+            "+": lambda: self._strengthen(FORCE_FACTOR),
+            "=": lambda: self._strengthen(FORCE_FACTOR),
+            "-": lambda: self._strengthen(1 / FORCE_FACTOR),
         }
         self._seen, self._status = (math.inf, 0.0, 0.0), ""
         self._window.look(self._plant.view.camera)
         self._reset()
 
     def run(self, clock: Callable[[], float] = time.monotonic, sleep: Callable[[float], None] = time.sleep) -> None:
-        """Go on until the person leaves; where simulation is slower than the clock, it takes its time."""
+        """Run until the user quits; slower than real time if the simulation cannot keep up."""
         due = clock()
         while self.turn():
             due += 1.0 / RATE
@@ -106,7 +106,7 @@ class Session:
                 due = clock()
 
     def turn(self) -> bool:
-        """What a person did, then a share 1 / `RATE` of a second; False when it is time to leave."""
+        """Handle the user's input, then simulate 1 / `RATE` seconds; return False to quit."""
         if not self._window.open:
             return False
         for key in self._window.pressed():
@@ -120,14 +120,14 @@ class Session:
         return not self.leaving
 
     def press(self, key: str) -> None:
-        """Do what a key stands for; nothing for any other."""
+        """Run the action of a key; ignore unknown keys."""
         if key in DIRECTIONS:
             self._push(self.site, DIRECTIONS[key])
         elif key in self._actions:
             self._actions[key]()
 
     def status(self) -> str:
-        """How things are, in words."""
+        """Return the status line."""
         words = [self._name, f"t = {self.time_s:.0f} s", f"push {self.force:.3g} N"]
         if self.speed != 1:
             words.append(f"{self.speed:g} x speed")
@@ -144,7 +144,7 @@ class Session:
         self._wanted = 0.0
 
     def _advance(self, duration: float) -> None:
-        """Simulate so many seconds more, rounded to control periods in the long run."""
+        """Simulate `duration` more seconds; rounding to control periods does not accumulate."""
         self._wanted += duration
         while self.time_s < self._wanted - 1e-9 and not self.over:
             action, self._state = self._policy.predict(
@@ -155,14 +155,14 @@ class Session:
             self.fallen = fall_reason(info)
 
     def _show(self) -> None:
-        """Each look at the window waits for it: words and the view change less often than the robot moves."""
+        """Update text and view less often than the robot moves: each update waits for the window."""
         engine = self._plant.engine
         self._window.show(engine.state(), engine.payload_position())
         place = engine.site(self._sites[0])
-        if math.dist(place, self._seen) > VIEW:
+        if math.dist(place, self._seen) > VIEW_SLACK:
             self._window.follow(place)
         status = self.status()
-        if math.dist(place, self._seen) > VIEW or status != self._status:
+        if math.dist(place, self._seen) > VIEW_SLACK or status != self._status:
             self._window.write([status, *HELP], place)
             self._seen, self._status = place, status
 
@@ -170,9 +170,9 @@ class Session:
         if self.over:
             return
         x, y, z = (self.force * part for part in direction)
-        self._plant.push(site, (x, y, z), DURATION)
+        self._plant.push(site, (x, y, z), PUSH_DURATION)
         tip = np.asarray(self._plant.engine.site(site))
-        tail = tip - ARROW * np.asarray(direction)
+        tail = tip - ARROW_LENGTH * np.asarray(direction)
         self._window.arrow(tuple(tail.tolist()), tuple(tip.tolist()))
 
     def _next(self) -> None:
@@ -186,7 +186,7 @@ class Session:
         self.paused = not self.paused
 
     def _pace(self, factor: float) -> None:
-        slowest, fastest = SPEEDS
+        slowest, fastest = SPEED_RANGE
         self.speed = min(fastest, max(slowest, self.speed * factor))
 
     def _strengthen(self, factor: float) -> None:

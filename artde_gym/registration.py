@@ -1,6 +1,6 @@
-"""Names of environments and controllers, as strings that are resolved when used.
+"""Registration of environments and controllers by name; names are resolved when used.
 
-Nothing here imports an environment or a controller; a name is looked up the way Gymnasium looks up an environment id.
+Nothing here imports an environment or a controller; names are looked up as Gymnasium looks up environment ids.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from artde_gym.registry import Registry
 class ControllerSpec:
     """A controller by name: `entry_point` is "module:function", called as function(env, **kwargs).
 
-    `tuning_space`, in the same form and called the same way, gives the gains that tuning may change; None without any.
+    `tuning_space`, in the same form and called the same way, returns the tunable gains; None if there are none.
     """
 
     name: str
@@ -34,7 +34,7 @@ class ControllerSpec:
 
 
 class GainRange(NamedTuple):
-    """Where to look for a gain: from `initial`, between `low` and `high`, on a logarithmic scale; all above zero."""
+    """Search range of a gain: from `initial`, between `low` and `high`, on a logarithmic scale; all above zero."""
 
     initial: float
     low: float
@@ -44,12 +44,12 @@ class GainRange(NamedTuple):
 _brought: Registry[ControllerSpec] = Registry(
     "controller", "artde_gym.controllers", lambda specs: {spec.name: spec for spec in specs}
 )
-"""Controllers of this project and of installed plug-ins: each entry point names a sequence of them."""
+"""Controllers of this project and of installed plug-ins; each entry point names a sequence of specs."""
 _controllers: dict[str, ControllerSpec] = {}
-"""Controllers that are registered at run time."""
+"""Controllers registered at run time."""
 
 REPLACEABLE = "preset"
-"""The one fixed argument that an override may replace: it says from which gains to start, not which law it is."""
+"""The only fixed argument that an override may replace: it selects the initial gains, not the law."""
 
 
 @renamed_arguments({"search": "tuning_space"})
@@ -59,17 +59,17 @@ def register_controller(
     """Make `name` known to `controllers.make`, to `evaluate` and to the command line.
 
     Args:
-        name: as users will write it.
+        name: name for users.
         entry_point: "module:function"; the function is called as function(env, **kwargs, **overrides) and returns a
             policy with Stable-Baselines3's `predict`.
         text: one line for listings.
         tuning_space: "module:function" for `artde-gym tune`; called as function(env, **kwargs), it returns a mapping
             from gains to `GainRange`.
-        kwargs: fixed arguments of the function, which no override replaces (but for a `preset`).
+        kwargs: fixed arguments of the function, which overrides cannot replace (except a `preset`).
 
     Raises:
-        OptionError: for a name that is no word, or that of a controller of this project or of a plug-in.
-        UnknownNameError: if an entry point is not of that form.
+        OptionError: if the name is invalid or belongs to a controller of this project or of a plug-in.
+        UnknownNameError: if an entry point does not have that form.
     """
     if not (isinstance(name, str) and name):
         raise OptionError("name of a controller", name, "a word")
@@ -78,7 +78,7 @@ def register_controller(
             raise UnknownNameError(field, point, '"module:function"')
     spec = ControllerSpec(name, entry_point, dict(kwargs), text, tuning_space)
     if _brought.get(name, spec) != spec:
-        raise OptionError("name of a controller", name, f"a new name; these are taken: {', '.join(sorted(_brought))}")
+        raise OptionError("name of a controller", name, f"any name except {', '.join(sorted(_brought))}")
     register_spec(spec)
 
 
@@ -87,12 +87,12 @@ def _is_entry_point(point: object) -> bool:
 
 
 def register_spec(spec: ControllerSpec) -> None:
-    """Make a controller known that another process has registered."""
+    """Register a controller that another process has registered."""
     _controllers[spec.name] = spec
 
 
 def registered_controllers() -> dict[str, ControllerSpec]:
-    """All known controllers by name."""
+    """Return all known controllers by name."""
     return {**_brought, **_controllers}
 
 
@@ -100,8 +100,8 @@ def make_controller(name: str, env: Any, /, **overrides: Any) -> Any:
     """Build the controller called `name` for an environment; `overrides` replace its gains, preset and options.
 
     Raises:
-        UnknownNameError: if no controller has this name, or its entry point names nothing that can be imported.
-        OptionError: for arguments that it does not take or that its name has fixed, or if it makes no policy.
+        UnknownNameError: if no controller has this name, or its entry point cannot be imported.
+        OptionError: for arguments that it does not take or that its name fixes, or if it returns no policy.
     """
     known = _known(name)
     for fixed in known.kwargs.keys() & overrides.keys() - {REPLACEABLE}:
@@ -119,10 +119,10 @@ def make_controller(name: str, env: Any, /, **overrides: Any) -> Any:
 
 
 def tuning_space(name: str, env: Any) -> dict[str, GainRange]:
-    """The gains of the controller called `name` that tuning may change, for the robot of an environment.
+    """Return the tunable gains of the controller called `name` for the robot of an environment.
 
     Raises:
-        UnknownNameError: if no controller has this name, its gains have no ranges, or `tuning_space` cannot be
+        UnknownNameError: if no controller has this name, it has no tunable gains, or `tuning_space` cannot be
             imported.
     """
     known = _known(name)
@@ -140,7 +140,7 @@ def _known(name: str) -> ControllerSpec:
 
 
 def _imported(name: str, entry_point: str) -> Callable[..., Any]:
-    """The function behind a controller.
+    """Import the function of a controller.
 
     Raises:
         UnknownNameError: if it cannot be imported.
@@ -156,7 +156,7 @@ def _imported(name: str, entry_point: str) -> Callable[..., Any]:
 
 
 def resolved(entry_point: str) -> Callable[..., Any]:
-    """The function that an entry point "module:function" names."""
+    """Return the function that an entry point "module:function" names."""
     module, function = entry_point.split(":")
     return getattr(importlib.import_module(module), function)
 

@@ -1,4 +1,4 @@
-"""Open registries: the project's own entries, those of installed plug-ins, and those registered at run time."""
+"""Registries of entries from this project, from installed plug-ins and registered at run time."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ T = TypeVar("T")
 
 
 def pointed(group: str) -> dict[str, str]:
-    """Return what the entry points of a group name, "module:object" by name, without importing any of it.
+    """Return the entry points of a group, "module:object" by name, without importing any.
 
-    The project's own come before others, in a fixed order.
+    The project's own come first, in a fixed order.
     """
     return {point.name: point.value for point in _in_order(group)}
 
@@ -30,13 +30,13 @@ def _in_order(group: str) -> list[EntryPoint]:
 
 
 class Registry(Mapping[str, T], Generic[T]):
-    """Named entries, read as a mapping; plug-ins are looked for at the first look into it.
+    """A mapping of named entries that loads plug-ins on first access.
 
     Args:
-        noun: of an entry, for errors.
-        group: of the entry points (of any installed distribution) that bring entries.
-        unpack: turns one loaded entry point into entries by name; without, it is one entry, under its own name.
-        own: entries that are there from the beginning.
+        noun: word for an entry in errors.
+        group: group of the entry points (of any installed distribution) that provide entries.
+        unpack: converts a loaded entry point to entries by name; None: it is one entry under its own name.
+        own: initial entries.
     """
 
     def __init__(
@@ -84,26 +84,27 @@ class Registry(Mapping[str, T], Generic[T]):
         return len(self._entries)
 
     def _load(self) -> None:
-        """Load every entry point of the group, the project's own before others, in a fixed order."""
+        """Load every entry point of the group, the project's own first, in a fixed order."""
         if self._loaded:
             return
-        self._loaded = True  # first: what is loaded may look in here
+        self._loaded = True  # set first: a plug-in may access the registry while it is loaded
         for point in _in_order(self.group):
             loaded = self._imported(point)
             for name, entry in ({point.name: loaded} if self._unpack is None else self._unpack(loaded)).items():
                 self._add(name, entry, replace=False)
 
     def _imported(self, point: EntryPoint) -> Any:
-        """Import what a plug-in brings.
+        """Import the object of a plug-in.
 
         Raises:
-            UnknownNameError: if that cannot be imported.
+            UnknownNameError: if it cannot be imported.
         """
         try:
             return point.load()
         except (ImportError, AttributeError) as error:
             owner = "a plug-in" if point.dist is None else point.dist.name
-            allowed = f'"module:object" that can be imported ({error}); mend or uninstall {owner}'
+            allowed = f'"module:object" that can be imported ({error}); repair or uninstall {owner}'
+
             raise UnknownNameError(f"entry point of {point.name!r} in {self.group}", point.value, allowed) from error
 
     def _add(self, name: str, entry: T, replace: bool) -> None:

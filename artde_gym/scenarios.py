@@ -1,7 +1,7 @@
 """Named scenarios: an environment, its arguments and its disturbances, fixed on physical grounds.
 
-Each robot brings its own, see `artde_gym.robots`. Every scenario varies from seed to seed, so that a result is a rate
-and not a single trajectory.
+Each robot brings its own, see `artde_gym.robots`. Every scenario varies with the seed, so that results are rates over
+many trajectories.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from artde_gym.registry import Registry
 
 @dataclasses.dataclass(frozen=True)
 class Scenario:
-    """One entry.
+    """A named scenario.
 
     Attributes:
-        thesis: the thesis' scenario that it stands beside, if any.
-        phases: (start, end) (s) of parts that are measured one by one too.
+        thesis: the corresponding scenario of the thesis, if any.
+        phases: (start, end) (s) of parts that also get metrics of their own.
     """
 
     name: str
@@ -34,7 +34,7 @@ class Scenario:
 SCENARIOS: Registry[Scenario] = Registry(
     "scenario", "artde_gym.robots", lambda kit: {entry.name: entry for entry in kit.scenarios}
 )
-"""All scenarios by name: those of every robot, and those registered."""
+"""All scenarios by name: those of every robot, and registered ones."""
 
 
 def scenario(name: str) -> Scenario:
@@ -47,7 +47,7 @@ def scenario(name: str) -> Scenario:
 
 
 def register_scenario(entry: Scenario, *, replace: bool = False) -> None:
-    """Make a scenario known to `evaluate`, to `reset(options={"scenario": ...})` and to the command line.
+    """Register a scenario for `evaluate`, `reset(options={"scenario": ...})` and the command line.
 
     Raises:
         OptionError: if its name is taken and `replace` is not given.

@@ -74,7 +74,7 @@ def test_disturbances_under_old_names_are_drawn_as_under_new_ones() -> None:
     "both", [{"mass_error": 1.0, "mass_scale": 1.0}, {"payload": {"mass": 1.0, "drop": 1.0, "detach_time": 1.0}}]
 )
 def test_an_old_name_beside_the_new_one_is_refused(both: dict[str, Any]) -> None:
-    with pytest.raises(DisturbanceError, match="alone, which is its name now"):
+    with pytest.raises(DisturbanceError, match="its new name"):
         current_disturbances(both)
 
 

@@ -1,4 +1,4 @@
-"""The `artde-gym` command, one module a subcommand; the one package here that may import controllers and baselines."""
+"""The `artde-gym` command, one module per subcommand; only this package may import controllers and baselines."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ app = typer.Typer(
     add_completion=False,
     no_args_is_help=True,
     rich_markup_mode=None,
-    help="Environments and judges of time-delay control.",
+    help="Simulate and evaluate time-delay control.",
 )
 app.command()(evaluate.evaluate)
 app.command()(frontier.frontier)
@@ -51,19 +51,19 @@ app.command()(design.design)
 
 
 def main() -> None:
-    """Run the command; a mistake of the user's is one line on standard error and exit code 2."""
+    """Run the command; user errors are reported in one line on standard error with exit code 2."""
     try:
         app()
-    except (ArtdeGymError, GainError, gym.error.Error, OSError) as error:  # of the system: a full disk, say
+    except (ArtdeGymError, GainError, gym.error.Error, OSError) as error:  # OSError: a full disk, for example
         typer.echo(f"artde-gym: {error}", err=True)
         sys.exit(2)
 
 
 @app.callback(invoke_without_command=True)
 def version(
-    show: Annotated[bool, typer.Option("--version", help="Print the version and stop.")] = False,
+    show: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
 ) -> None:
-    """Environments and judges of time-delay control."""
+    """Simulate and evaluate time-delay control."""
     if show:
         print(f"artde-gym {__version__}")
         raise typer.Exit

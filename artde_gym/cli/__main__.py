@@ -1,4 +1,4 @@
-"""`python -m artde_gym.cli`."""
+"""Entry point of `python -m artde_gym.cli`."""
 
 from artde_gym.cli import main
 

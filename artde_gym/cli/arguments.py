@@ -1,4 +1,4 @@
-"""What several commands ask for: their options, each declared once, and how their text is read."""
+"""Options shared by several commands, and the parsing of their values."""
 
 from __future__ import annotations
 
@@ -17,59 +17,65 @@ from artde_gym.sim.factory import ENGINES
 
 WALK = "BipedWalk-Payload-v0"
 
-Controllers = Annotated[str, typer.Option(help="Names, comma-separated; see `list`.")]
-Seed = Annotated[int, typer.Option(help="Seed of everything.")]
-Workers = Annotated[int | None, typer.Option(help="Processes. Default: all cores.")]
+Controllers = Annotated[str, typer.Option(help="Comma-separated names; see `list`.")]
+Seed = Annotated[int, typer.Option(help="Base random seed.")]
+Workers = Annotated[int | None, typer.Option(help="Number of processes. Default: all cores.")]
 Out = Annotated[Path | None, typer.Option(help="Results folder. Default: runs/<date and time>.")]
 Vectorized = Annotated[
-    bool, typer.Option("--vectorized", help="Many episodes at once in a vector environment (of the biped, in MuJoCo).")
+    bool,
+    typer.Option("--vectorized", help="Run many episodes at once in a vector environment (the biped's in MuJoCo)."),
 ]
 Backend = Annotated[str | None, typer.Option(hidden=True)]
-"""Old form of `--vectorized`."""
+"""Deprecated form of `--vectorized`."""
 Engine = Annotated[str | None, typer.Option(help=f"Physics engine: {' or '.join(ENGINES)}. Default: see `doctor`.")]
-Disturbances = Annotated[str | None, typer.Option(help="JSON, in place of those that belong to what is run.")]
-EnvKwargs = Annotated[str | None, typer.Option(help="JSON, arguments of the environment.")]
-Gains = Annotated[str | None, typer.Option(help='JSON, e.g. {"artde": {"gamma_0": 200}}.')]
+Disturbances = Annotated[str | None, typer.Option(help="JSON; override the scenario's disturbances.")]
+EnvKwargs = Annotated[str | None, typer.Option(help="JSON; arguments of the environment.")]
+Gains = Annotated[str | None, typer.Option(help='JSON; gains by controller, e.g. {"artde": {"gamma_0": 200}}.')]
 AllowMixed = Annotated[
     bool,
-    typer.Option("--allow-mixed", help="Continue a folder that other software has begun; its provenance will say so."),
+    typer.Option(
+        "--allow-mixed", help="Resume a folder started with other software versions; its provenance records this."
+    ),
 ]
-Report = Annotated[bool, typer.Option("--report", help="Write report.html, too.")]
+Report = Annotated[bool, typer.Option("--report", help="Also write report.html.")]
 Pictures = Annotated[
-    bool, typer.Option("--pictures", help="Report with pictures of the motion, pushes and falls; runs them once more.")
+    bool,
+    typer.Option(
+        "--pictures", help="Add pictures of the motion, pushes and falls to the report; runs these episodes again."
+    ),
 ]
-Videos = Annotated[bool, typer.Option("--videos", help="Report with a video of each scenario (needs ffmpeg).")]
+Videos = Annotated[bool, typer.Option("--videos", help="Add a video of each scenario to the report (needs ffmpeg).")]
 
 
 def renamed_option(old: str, new: str) -> None:
-    """Tell which option has taken the place of one that was given."""
+    """Warn of a deprecated option."""
     typer.echo(f"{old} is deprecated; use {new}", err=True)
 
 
 def vectorized_by(vectorized: bool, backend: str | None) -> bool:
-    """Tell whether episodes run in a vector environment, also by the option's old form.
+    """Return True if episodes run in a vector environment, according to `--vectorized` or the deprecated `--backend`.
 
     Raises:
-        OptionError: for a backend that never was.
+        OptionError: for an unknown backend.
     """
     if backend is None:
         return vectorized
     if backend not in ("single", "batch"):
-        raise OptionError("--backend", backend, "'batch', 'single'; or rather --vectorized")
+        raise OptionError("--backend", backend, "'batch', 'single'; better use --vectorized")
     renamed_option("--backend", "--vectorized")
     return backend == "batch"
 
 
 def names(text: str) -> list[str]:
-    """What a comma-separated list names."""
+    """Split a comma-separated list of names."""
     return [name.strip() for name in text.split(",")]
 
 
 def json_object(option: str, text: str | None) -> dict[str, Any]:
-    """A JSON object; empty where there is no text.
+    """Parse a JSON object; empty without text.
 
     Raises:
-        OptionError: not a JSON object.
+        OptionError: if the text is not a JSON object.
     """
     if text is None:
         return {}
@@ -83,23 +89,23 @@ def json_object(option: str, text: str | None) -> dict[str, Any]:
 
 
 def optional_json(option: str, text: str | None) -> dict[str, Any] | None:
-    """A JSON object; None where there is no text, since an empty object says something."""
+    """Parse a JSON object; None without text, since an empty object has a meaning."""
     return None if text is None else json_object(option, text)
 
 
 def environment_kwargs(text: str | None, engine: str | None) -> dict[str, Any]:
-    """Arguments of the environment out of `--env-kwargs` and `--engine`."""
+    """Return the environment's arguments from `--env-kwargs` and `--engine`."""
     kwargs = json_object("--env-kwargs", text)
     return kwargs if engine is None else {**kwargs, "engine": engine}
 
 
 def processes(workers: int | None) -> int:
-    """As many as were asked for, or all cores."""
+    """Return the given number of processes, or one per core."""
     return (os.cpu_count() or 1) if workers is None else workers
 
 
 def folder_of(out: Path | None) -> Path:
-    """The results folder that was asked for, or a new one of this second, which is this process's own."""
+    """Return the given results folder, or create a new one, named by the time, for this process alone."""
     if out is not None:
         return out
     second = Path("runs") / datetime.datetime.now().strftime("%Y-%m-%d-%H%M%S")
@@ -112,7 +118,7 @@ def folder_of(out: Path | None) -> Path:
 
 
 def _made(folder: Path) -> bool:
-    """Make a folder, if it is not there yet."""
+    """Make a folder; return False if it exists."""
     try:
         folder.mkdir(parents=True)
     except FileExistsError:

@@ -21,13 +21,15 @@ from artde_gym.evaluation.store import write_atomically
 
 def benchmark(
     sections: Annotated[
-        str | None, typer.Option(help=f"Names, comma-separated: {', '.join(SECTIONS)}. Default: all.")
+        str | None, typer.Option(help=f"Comma-separated names: {', '.join(SECTIONS)}. Default: all.")
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="A tenth of the work: for a look.")] = False,
-    json_file: Annotated[Path | None, typer.Option("--json", help="Write everything to this file, too.")] = None,
-    page_file: Annotated[Path | None, typer.Option("--page", help="Write docs/benchmark.md, or such a page.")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Do a tenth of the work, for a first impression.")] = False,
+    json_file: Annotated[Path | None, typer.Option("--json", help="Also write all results to this file.")] = None,
+    page_file: Annotated[
+        Path | None, typer.Option("--page", help="Write a page like docs/benchmark.md to this file.")
+    ] = None,
 ) -> None:
-    """Measure speed and memory of environments and controllers, as ratios in one run; some minutes."""
+    """Measure speed and memory of environments and controllers as ratios; takes some minutes."""
     console = terminal()
     with console.status("") as status:
         found = measure(
@@ -56,7 +58,7 @@ def _print(section: Section, console: Console) -> None:
     if section.figures:
         console.print(table)
     if section.skipped:
-        console.print(f"{section.title}: left out: {section.skipped}\n")
+        console.print(f"{section.title}: skipped: {section.skipped}\n")
 
 
 def _write(file: Path, text: str, console: Console) -> None:

@@ -1,4 +1,4 @@
-"""All that there is, as data that JSON can hold: what `list` shows."""
+"""Catalog of all registered entries as JSON-able data, for `list`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Entries = list[dict[str, Any]]
 
 
 def environments() -> Entries:
-    """Every environment with its arguments and defaults."""
+    """Return every environment with its arguments and defaults."""
     return [
         {
             "name": name,
@@ -41,7 +41,7 @@ def environments() -> Entries:
 
 
 def scenarios() -> Entries:
-    """Every scenario with its environment, arguments and disturbances."""
+    """Return every scenario with its environment, arguments and disturbances."""
     return [
         {
             "name": entry.name,
@@ -57,7 +57,7 @@ def scenarios() -> Entries:
 
 
 def controllers() -> Entries:
-    """Every controller with the gains of each preset, by robot, as far as it has presets."""
+    """Return every controller with the gains of its presets by robot."""
     found = []
     for name, spec in registered_controllers().items():
         law, wanted = spec.kwargs.get("law", name), spec.kwargs.get("preset")
@@ -95,7 +95,7 @@ def controllers() -> Entries:
 
 
 def disturbances() -> Entries:
-    """Every kind of disturbance with the schema of its parameters."""
+    """Return every kind of disturbance with the schema of its parameters."""
     return [
         {
             "name": kind.name,
@@ -132,7 +132,7 @@ def disturbances() -> Entries:
 
 
 def frontiers() -> Entries:
-    """Every path that a frontier varies within a range of its own."""
+    """Return every path with a default range in `frontier`."""
     return [
         {"name": path, "robot": robot, **values._asdict()}
         for robot, kit in ROBOTS.items()
@@ -142,7 +142,7 @@ def frontiers() -> Entries:
 
 
 def _words(words: tuple[str, ...] | str, robot: str) -> list[str]:
-    """What a word may be: places and joints are the robot's."""
+    """Return the allowed words of a parameter; sites and joints are the robot's."""
     if not isinstance(words, str):
         return list(words)
     kit = ROBOTS[robot]
@@ -159,13 +159,13 @@ TOPICS: dict[str, Callable[[], Entries]] = {
 
 
 def engines(env_id: str) -> list[str]:
-    """What an environment runs in; "batch" is many at once."""
+    """Return the engines of an environment; "batch" stands for vector environments."""
     able = [*ENGINES] if "engine" in arguments_of(env_id) else []
     return [*able, *(["batch"] if gym.spec(env_id).vector_entry_point else [])]
 
 
 def _plain(value: Any) -> Any:
-    """A gain or default as JSON has it: matrices and vectors as lists, what is not finite as a word."""
+    """Convert a gain or default to JSON: matrices and vectors to lists, infinities and NaN to words."""
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     if isinstance(value, (np.ndarray, tuple, list)):

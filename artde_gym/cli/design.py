@@ -1,4 +1,4 @@
-"""`artde-gym design`: how large m_bar may be, and how stiff the joints are then."""
+"""`artde-gym design`: valid range of m_bar and the resulting joint stiffness."""
 
 from __future__ import annotations
 
@@ -23,25 +23,27 @@ from controllers.design import DELAYED, Design, designed
 from controllers.design import design as work_out
 
 NAMES = {ROBOTS[robot].title: robot for robot in designed() if robot in ROBOTS}
-"""Robots by their titles."""
+"""Robots by title."""
 
 
 def design(
     robot: Annotated[str, typer.Option(help=f"{' or '.join(NAMES)}.")] = "biped",
     law: Annotated[str, typer.Option(help=f"{', '.join(DELAYED)}.")] = "tde",
-    preset: Annotated[str | None, typer.Option(help="Of the law's gains; see `list controllers`.")] = None,
-    gains: Annotated[str | None, typer.Option(help='JSON, in place of the preset\'s, e.g. {"m_bar": 0.08}.')] = None,
-    period: Annotated[float | None, typer.Option(help="Sampling period L (s). Default: the robot's.")] = None,
+    preset: Annotated[str | None, typer.Option(help="Preset of the law's gains; see `list controllers`.")] = None,
+    gains: Annotated[str | None, typer.Option(help='JSON; override gains of the preset, e.g. {"m_bar": 0.08}.')] = None,
+    period: Annotated[float | None, typer.Option(help="Control period L (s). Default: the robot's.")] = None,
     actuator_inertia: Annotated[
-        str | None, typer.Option(help="Of the biped: rotor, lumped or none. Default: rotor.")
+        str | None, typer.Option(help="Biped only: rotor, lumped or none. Default: rotor.")
     ] = None,
-    speed: Annotated[float | None, typer.Option(help="Of the biped's walk (m/s). Default: 0.1.")] = None,
-    step_duration: Annotated[float | None, typer.Option(help="Of the biped's walk (s). Default: 1.")] = None,
-    motion: Annotated[str | None, typer.Option(help="JSON, arguments of another robot's motion.")] = None,
-    figure: Annotated[Path | None, typer.Option(help="SVG of the limit along the reference, one file a loop.")] = None,
+    speed: Annotated[float | None, typer.Option(help="Biped only: walking speed (m/s). Default: 0.1.")] = None,
+    step_duration: Annotated[float | None, typer.Option(help="Biped only: duration of a step (s). Default: 1.")] = None,
+    motion: Annotated[str | None, typer.Option(help="JSON; arguments of another robot's motion.")] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="SVG file for the limit along the reference, one per loop.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Print the valid range of m_bar, the joint stiffness K_d m_bar / L, and the room up to the edge."""
+    """Print the valid range of m_bar, the joint stiffness K_d m_bar / L, and the margin to the limit."""
     if robot not in NAMES:
         raise OptionError("robot", robot, ", ".join(map(repr, NAMES)))
     if period is not None:
@@ -63,7 +65,7 @@ def design(
 
 
 def draw(one: Design) -> str:
-    """Draw the largest valid m_bar along the reference beside the chosen one, as an SVG file."""
+    """Draw the largest valid and the chosen m_bar along the reference, as SVG."""
     unit, time = one.loop.unit, one.loop.time
     still = len(time) == 1
     x = Axis("time (s)", 0.0, 1.0 if still else float(time[-1]))
@@ -93,9 +95,9 @@ def _print(one: Design, console: Console) -> None:
         table.add_row(joint["name"], *("" if number is None else f"{number:.4g}" for number in numbers))
     console.print(table)
     console.print(
-        f"Valid below: of a joint with the others as chosen. One m_bar for all: {one.largest:.4g} {loop.unit}."
+        f"Valid below: limit of a joint with the others as chosen. One m_bar for all: {one.largest:.4g} {loop.unit}."
     )
     low, high = one.eigenvalues.min(), one.eigenvalues.max()
-    edge = f"{100 * one.used:.0f} % of the way to the edge at 2, room for a factor of {one.room:.3g}"
+    edge = f"{100 * one.used:.0f} % of the limit 2, margin of a factor {one.room:.3g}"
     verdict = edge if one.valid else "OUTSIDE (0, 2): time-delay estimation diverges"
     console.print(f"Eigenvalues of M^-1 m_bar: {low:.3g} to {high:.3g}, {verdict}.")

@@ -1,4 +1,4 @@
-"""Live progress on the console."""
+"""Progress display on the console."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from artde_gym.evaluation.tasks import Task, Update
 
 
 def terminal() -> Console:
-    """A console for which every text is just what it says: brackets in a path or a label are no markup."""
+    """Return a console without markup, so that brackets in a path or a label are printed."""
     return Console(markup=False, emoji=False)
 
 
 def words(field: str) -> TextColumn:
-    """A column of a progress bar that shows a field of its task, brackets and all."""
+    """Return a progress-bar column that shows a field of its task without markup."""
     return TextColumn(f"{{task.{field}}}", markup=False)
 
 
 class Display:
-    """Live progress of an evaluation: a bar of finished episodes, and how far the running ones are."""
+    """Progress of an evaluation: a bar of finished episodes, and the simulated time of running ones."""
 
     def __init__(self, console: Console) -> None:
         self._running: dict[tuple[str, str, str], float] = {}
@@ -47,10 +47,10 @@ class Display:
     def __call__(self, update: Update, what: str = "episodes") -> None:
         if not self._progress.live.is_started:
             self._progress.console.print(f"Engine: {engine_of(update.task)}")
-        self._progress.start()  # with the first news; an error before it leaves no empty bar
+        self._progress.start()  # with the first update, so that an earlier error leaves no empty bar
         if what != self._what:
             self._what = what
-            self._progress.reset(self._bar)  # a bar that was full once has stopped its clock
+            self._progress.reset(self._bar)  # a full bar has stopped its clock
         first, last = update.task.episodes[0], update.task.episodes[-1]
         numbers = f"#{first}" if first == last else f"#{first}..{last}"
         key = (update.task.cell.name, update.task.controller, numbers)
@@ -65,6 +65,6 @@ class Display:
 
 
 def engine_of(task: Task) -> str:
-    """Say in which physics a task runs, and its version."""
+    """Return the physics engine of a task and its version."""
     written = physics_of(task.cell.kwargs)
     return " ".join([written, *versions([written.lower()]).values()])

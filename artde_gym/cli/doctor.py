@@ -1,4 +1,4 @@
-"""`artde-gym doctor`: whether this machine can run everything."""
+"""`artde-gym doctor`: checks of the installation."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ LOOK = {"ok": ("ok", "green"), "missing": ("--", "yellow"), "failed": ("FAILED",
 
 def doctor(
     checks: Annotated[
-        str | None, typer.Option(help=f"Names, comma-separated: {', '.join(CHECKS)}. Default: all.")
+        str | None, typer.Option(help=f"Comma-separated names: {', '.join(CHECKS)}. Default: all.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Check whether this machine can run everything, and say what to do; exit code 1 if something necessary fails."""
+    """Check your installation and suggest fixes; the exit code is 1 if a required check fails."""
     console = terminal()
     found: dict[str, Report] = {}
     start = time.monotonic()
@@ -57,6 +57,6 @@ def _print(report: Report, console: Console) -> None:
 
 def _verdict(counts: dict[str, int]) -> str:
     if counts["failed"]:
-        return f"{counts['failed']} of the necessary things failed: do what the lines under FAILED say."
-    optional = f" {counts['missing']} optional things are missing (--)." if counts["missing"] else ""
-    return f"Everything necessary works.{optional}"
+        return f"{counts['failed']} required checks failed; follow the suggestions below FAILED."
+    optional = f" Optional and missing (--): {counts['missing']}." if counts["missing"] else ""
+    return f"All required checks passed.{optional}"

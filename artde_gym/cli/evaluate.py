@@ -1,4 +1,4 @@
-"""`artde-gym evaluate`: controllers on the same seeded episodes."""
+"""`artde-gym evaluate`: comparison of controllers on the same seeded episodes."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ def evaluate(
     scenario: Annotated[
         str | None,
         typer.Option(
-            help="Names, comma-separated; see `list`. Default: the environment's main ones, or its first in batches."
+            help="Comma-separated names; see `list`. Default: the environment's main ones; if vectorized, the first."
         ),
     ] = None,
     env: Annotated[str | None, typer.Option(help=f"Environment id. Default: the scenarios', or {WALK}.")] = None,
-    episodes: Annotated[int, typer.Option(help="Seeded episodes of each controller in each scenario.")] = 3,
+    episodes: Annotated[int, typer.Option(help="Seeded episodes per controller and scenario.")] = 3,
     seed: Seed = 0,
     workers: Workers = None,
     out: Out = None,
@@ -58,17 +58,17 @@ def evaluate(
     env_kwargs: EnvKwargs = None,
     gains: Gains = None,
     record_episodes: Annotated[
-        int | None, typer.Option(help="Episodes that leave signals. Default: all of them; none if vectorized.")
+        int | None, typer.Option(help="Number of episodes whose signals are stored. Default: all; none if vectorized.")
     ] = None,
     traced: Annotated[int | None, typer.Option(hidden=True)] = None,
-    record_hz: Annotated[float, typer.Option(help="Rate of stored signals; inf for all of them.")] = 100.0,
+    record_hz: Annotated[float, typer.Option(help="Rate of stored signals (Hz); inf for every step.")] = 100.0,
     trace_hz: Annotated[float | None, typer.Option(hidden=True)] = None,
     allow_mixed: AllowMixed = False,
     report: Report = False,
     pictures: Pictures = False,
     videos: Videos = False,
 ) -> None:
-    """Compare controllers on the same seeded episodes and print them beside the thesis."""
+    """Compare controllers on the same seeded episodes and with the thesis."""
     vectorized = vectorized_by(vectorized, backend)
     if traced is not None:
         renamed_option("--traced", "--record-episodes")

@@ -1,4 +1,4 @@
-"""`artde-gym frontier`: how much of one disturbance each controller survives."""
+"""`artde-gym frontier`: robustness margin of each controller to one disturbance."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ VARIED = dict.fromkeys(path for kit in ROBOTS.values() if kit.frontier for path 
 
 
 def frontier(
-    vary: Annotated[str, typer.Option(help=f"What to vary; with a range of its own: {', '.join(VARIED)}.")],
+    vary: Annotated[str, typer.Option(help=f"Parameter to vary; with a default range: {', '.join(VARIED)}.")],
     controllers: Controllers = "tde,atde,artde",
     env: Annotated[str, typer.Option(help="Environment id.")] = "BipedPush-v0",
     low: Annotated[float | None, typer.Option(help="Smallest value, in the parameter's unit.")] = None,
     high: Annotated[float | None, typer.Option(help="Largest value.")] = None,
-    tolerance: Annotated[float | None, typer.Option(help="Width of the bracket to be found.")] = None,
-    harder: Annotated[str | None, typer.Option(help="larger or smaller: which values are harder.")] = None,
-    episodes: Annotated[int, typer.Option(help="Seeded episodes of each controller at each level.")] = 20,
+    tolerance: Annotated[float | None, typer.Option(help="Final width of the bracket.")] = None,
+    harder: Annotated[str | None, typer.Option(help="Harder values: larger or smaller.")] = None,
+    episodes: Annotated[int, typer.Option(help="Seeded episodes per controller and level.")] = 20,
     seed: Seed = 0,
     workers: Workers = None,
     survival: Annotated[float, typer.Option(help="Share of episodes without a fall that counts as survived.")] = 0.9,
@@ -70,7 +70,7 @@ def frontier(
     allow_mixed: AllowMixed = False,
     report: Report = False,
 ) -> None:
-    """Find how much of one disturbance each controller survives; the same command continues an interrupted run."""
+    """Find how much of one disturbance each controller survives. Re-run the command to resume."""
     kwargs = environment_kwargs(env_kwargs, engine)
     console, folder = terminal(), folder_of(out)
     scenarios = [None] if scenario is None else names(scenario)

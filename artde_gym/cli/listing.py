@@ -1,4 +1,4 @@
-"""`artde-gym list`: what there is."""
+"""`artde-gym list`: registered environments, scenarios, controllers, disturbances and frontiers."""
 
 from __future__ import annotations
 
@@ -21,15 +21,17 @@ Shown = Callable[[Entries, Console], None]
 
 
 def list_everything(
-    topic: Annotated[str | None, typer.Argument(help=f"In full: {', '.join(TOPICS)}. Default: all, in short.")] = None,
-    name: Annotated[str | None, typer.Option(help="Of the topic's entries these, comma-separated.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, with everything in it.")] = False,
+    topic: Annotated[
+        str | None, typer.Argument(help=f"Topic to show in full: {', '.join(TOPICS)}. Default: a summary of all.")
+    ] = None,
+    name: Annotated[str | None, typer.Option(help="Comma-separated entries of the topic.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON.")] = False,
 ) -> None:
-    """Show environments, scenarios, controllers with their gains, disturbances with their schemas, frontiers."""
+    """List environments, scenarios, controllers with their gains, disturbances with their schemas, and frontiers."""
     if topic is not None and topic not in TOPICS:
         raise UnknownNameError("topic", topic, suggest_names(topic, TOPICS))
     if name is not None and topic is None:
-        raise UnknownNameError("topic", topic, f"{', '.join(TOPICS)}, where names are given")
+        raise UnknownNameError("topic", topic, f"{', '.join(TOPICS)}; --name needs one")
     found = {one: TOPICS[one]() for one in (TOPICS if topic is None else [topic])}
     if topic is not None and name is not None:
         found[topic] = _chosen(found[topic], topic, names(name))
@@ -40,7 +42,7 @@ def list_everything(
     for one, entries in found.items():
         (_SHORT if topic is None else _FULL)[one](entries, console)
     if topic is None:
-        console.print(f"In full: `artde-gym list` with one of {', '.join(TOPICS)}.")
+        console.print(f"For details: `artde-gym list` with one of {', '.join(TOPICS)}.")
 
 
 def _chosen(entries: Entries, topic: str, wanted: list[str]) -> Entries:
@@ -70,11 +72,11 @@ def _environments_in_full(entries: Entries, console: Console) -> None:
         for argument, default in entry["arguments"].items():
             table.add_row(argument, "the environment's own" if argument == "disturbances" else repr(default))
         console.print(table)
-    console.print("What they mean, observation, action and reward: help(gymnasium.make(...).unwrapped)")
+    console.print("Arguments, observation, action and reward are explained by help(gymnasium.make(...).unwrapped)")
 
 
 def _scenarios(entries: Entries, console: Console) -> None:
-    table = _table("Scenarios", "scenario", "what it is")
+    table = _table("Scenarios", "scenario", "description")
     for entry in entries:
         arguments = "".join(f", {key}={value}" for key, value in entry["arguments"].items())
         table.add_row(entry["name"], _with_detail(entry["text"], entry["environment"] + arguments))
@@ -84,14 +86,14 @@ def _scenarios(entries: Entries, console: Console) -> None:
 def _scenarios_in_full(entries: Entries, console: Console) -> None:
     for entry in entries:
         _head(console, entry["name"], entry["text"])
-        beside = "" if entry["thesis"] is None else f"; beside the thesis' {entry['thesis']}"
+        beside = "" if entry["thesis"] is None else f"; the thesis' {entry['thesis']}"
         _line(console, f"{entry['environment']} in {', '.join(entry['engines'])}{beside}")
         _line(console, f"arguments: {json.dumps(entry['arguments'])}")
         _line(console, f"disturbances: {json.dumps(entry['disturbances'])}")
 
 
 def _controllers(entries: Entries, console: Console) -> None:
-    table = _table("Controllers", "controller", "what it is, its gains, its presets")
+    table = _table("Controllers", "controller", "description, gains, presets")
     for entry in entries:
         presets: dict[str, list[str]] = {}
         for preset in entry["presets"]:
@@ -105,7 +107,7 @@ def _controllers_in_full(entries: Entries, console: Console) -> None:
     for entry in entries:
         _head(console, entry["name"], entry["text"])
         if not entry["presets"]:
-            _line(console, f"no gains to choose from; made by {entry['entry_point']}")
+            _line(console, f"no presets; made by {entry['entry_point']}")
         for robot in dict.fromkeys(preset["robot"] for preset in entry["presets"]):
             own = [preset for preset in entry["presets"] if preset["robot"] == robot]
             table = _table(f"on {robot}", "gain", "unit")
@@ -119,12 +121,12 @@ def _controllers_in_full(entries: Entries, console: Console) -> None:
             for preset in own:
                 _line(console, f"{preset['preset']}: {preset['source']}")
     console.print()
-    console.print("* the default. In a quadrotor's cascade _p is the position loop and _q the attitude loop. Gains "
-                  "without a unit are words, or in SI units that Q = I mixes.")  # fmt: skip
+    console.print("* default. Suffixes in a quadrotor's cascade: _p position loop, _q attitude loop. Gains without a "
+                  "unit are words, or have mixed SI units because Q = I.")  # fmt: skip
 
 
 def _disturbances(entries: Entries, console: Console) -> None:
-    table = _table("Disturbances", "kind", "what it is, for whom, its parameters")
+    table = _table("Disturbances", "kind", "description, robots, parameters")
     for entry in entries:
         parameters = ", ".join(parameter["name"] for parameter in entry["parameters"])
         name = entry["name"] + (" (list)" if entry["list"] else "")
@@ -143,12 +145,12 @@ def _disturbances_in_full(entries: Entries, console: Console) -> None:
         for parameter in entry["parameters"]:
             default = "required" if parameter["required"] else _value(parameter["default"])
             default += "".join(f"\n{robot}: {_value(value)}" for robot, value in parameter["other_defaults"].items())
-            bare = " (what a bare number stands for)" if parameter["name"] == entry["bare_number"] else ""
+            bare = " (set by a bare number)" if parameter["name"] == entry["bare_number"] else ""
             kind = parameter["allowed"].replace(", or a distribution of such values", "")
             table.add_row(parameter["name"], default, kind, parameter["text"] + bare)
         console.print(table)
-    console.print(Text('In place of any number stands a distribution: {"uniform": [low, high]}, {"normal": [mean, '
-                       'std]} or {"choice": [...]}.'))  # fmt: skip
+    console.print(Text('Any number may be a distribution: {"uniform": [low, high]}, {"normal": [mean, std]} or '
+                       '{"choice": [...]}.'))  # fmt: skip
 
 
 def _frontiers(entries: Entries, console: Console) -> None:

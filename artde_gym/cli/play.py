@@ -1,4 +1,4 @@
-"""`artde-gym play`: a person in the loop."""
+"""`artde-gym play`: live simulation with user interaction."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from artde_gym.registration import make_controller
 
 def play(
     controller: Annotated[str, typer.Option(help="Name; see `list`.")] = "artde",
-    scenario: Annotated[str | None, typer.Option(help="Name; see `list`. Default: none, with --env as it is.")] = None,
+    scenario: Annotated[str | None, typer.Option(help="Name; see `list`. Default: none, just --env.")] = None,
     env: Annotated[str | None, typer.Option(help=f"Environment id. Default: the scenario's, or {WALK}.")] = None,
     seed: Seed = 0,
     engine: Engine = None,
@@ -33,7 +33,7 @@ def play(
     env_kwargs: EnvKwargs = None,
     gains: Gains = None,
 ) -> None:
-    """Watch a controller live in a window, push the robot and drop its payload by key or mouse."""
+    """Watch a controller live in a window; push the robot and drop its payload with keys or the mouse."""
     from artde_gym.evaluation.cells import cells_of  # only when asked for
     from artde_gym.evaluation.environments import single
     from artde_gym.play import HELP, Session
@@ -49,7 +49,7 @@ def play(
             raise OptionError("env", cell.env_id, "an environment with a physics engine, which a window can show")
         policy = make_controller(controller, plant, **overrides)
         window.load(plant.unwrapped.engine.spec)
-        print("\n".join((*HELP, "A click pushes away from you, at the nearest place on the robot.")))
+        print("\n".join((*HELP, "A click pushes away from the viewer, at the nearest site of the robot.")))
         Session(plant, policy, window, controller, seed).run()
     finally:
         window.close()

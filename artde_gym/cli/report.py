@@ -1,4 +1,4 @@
-"""`artde-gym report`: a results folder to look at."""
+"""`artde-gym report`: HTML report of a results folder."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ def report(
     pictures: Pictures = False,
     videos: Videos = False,
 ) -> None:
-    """Write report.html into a results folder, finished or not: one file that needs no network."""
+    """Write report.html into a results folder, finished or not; the file works offline."""
     show_report(folder, terminal(), pictures=pictures, videos=videos)
 
 
 def show_report(folder: Path, console: Console, *, pictures: bool = False, videos: bool = False) -> None:
-    """Write the report of a folder and say where it is."""
+    """Write the report of a folder and print its path."""
     from artde_gym.report import write_report  # only when asked for
 
     with console.status("Report") as status:

@@ -1,4 +1,4 @@
-"""`artde-gym reproduce`: the thesis' tables and claims."""
+"""`artde-gym reproduce`: reproduction of the thesis' tables and claims."""
 
 from __future__ import annotations
 
@@ -27,14 +27,12 @@ def reproduce(
     ] = None,
     episodes: Annotated[
         int | None,
-        typer.Option(
-            help="Seeded episodes of each controller in each scenario. Default: 10, or 4 where walks run singly."
-        ),
+        typer.Option(help="Seeded episodes per controller and scenario. Default: 10, or 4 where walks run singly."),
     ] = None,
-    scenario: Annotated[str | None, typer.Option(help="Names, comma-separated. Default: all of the robot.")] = None,
-    controllers: Annotated[str | None, typer.Option(help="Names, comma-separated. Default: the robot's own.")] = None,
+    scenario: Annotated[str | None, typer.Option(help="Comma-separated names. Default: all of the robot.")] = None,
+    controllers: Annotated[str | None, typer.Option(help="Comma-separated names. Default: the robot's.")] = None,
     ablation: Annotated[
-        bool, typer.Option(help="Run TDE at ARTDE's mean gain too; on a folder that is there, only what is new.")
+        bool, typer.Option(help="Also run TDE at ARTDE's mean gain; in an existing folder, only this is new.")
     ] = False,
     curves: Annotated[
         bool, typer.Option("--curves", help="Run the grids of `frontier` by which some claims are judged, too.")
@@ -42,21 +40,21 @@ def reproduce(
     seed: Seed = 0,
     workers: Workers = None,
     out: Annotated[
-        Path, typer.Option(help="Results folder, one inside for each engine and robot; the same call continues it.")
+        Path, typer.Option(help="Results folder, with one subfolder per engine and robot; re-run to resume.")
     ] = Path("runs/reproduce"),
     allow_mixed: AllowMixed = False,
     report: Report = False,
     pictures: Pictures = False,
     videos: Videos = False,
 ) -> None:
-    """Run the thesis' scenarios and print its tables beside ours, then each of its claims with a verdict."""
+    """Run the thesis' scenarios, compare its tables with the results, and judge each of its claims."""
     robots = titles() if robot == "all" else [robot]
     engines = list(ENGINES) if engine == "both" else [None if engine is None else resolve_engine(engine)]
     named = None if scenario is None else names(scenario)
     shares = {name: chosen for name in robots if (chosen := scenarios_of(name, named))}
     for one in named or ():
         if not any(one in chosen for chosen in shares.values()):
-            raise OptionError("scenario", one, f"one of the robot's, which is {robot!r}")
+            raise OptionError("scenario", one, f"a scenario of the robot {robot!r}")
     console = terminal()
     for name, chosen in shares.items():
         verdicts: dict[str, pd.DataFrame] = {}

@@ -1,4 +1,4 @@
-"""`artde-gym sweep`: any number of cells in seeded episodes."""
+"""`artde-gym sweep`: a grid or random sample of cases in seeded episodes."""
 
 from __future__ import annotations
 
@@ -14,18 +14,19 @@ from artde_gym.studies.sweep.console import print_sweep
 
 
 def sweep(
-    file: Annotated[Path, typer.Argument(help="YAML: what to run.")],
+    file: Annotated[Path, typer.Argument(help="YAML description of the sweep.")],
     out: Annotated[Path | None, typer.Option(help="Results folder. Default: runs/<name of the file>.")] = None,
     workers: Workers = None,
     executor: Annotated[
         str, typer.Option("--executor", "--engine", help="local: processes of this machine; ray: a Ray cluster.")
     ] = "local",
     address: Annotated[
-        str | None, typer.Option(help="Of a running Ray cluster, auto for this machine's. Default: one of its own.")
+        str | None,
+        typer.Option(help="Address of a running Ray cluster; auto: this machine's. Default: start a new one."),
     ] = None,
     allow_mixed: AllowMixed = False,
 ) -> None:
-    """Run a grid or a random sample of cells; the same command continues after whatever happened."""
+    """Run a grid or a random sample of cases. Re-run the command to resume."""
     console = terminal()
     with Display(console) as display:
         found = run_sweep(

@@ -1,4 +1,4 @@
-"""`artde-gym train`: a residual on a controller."""
+"""`artde-gym train`: training of a residual on a controller."""
 
 from __future__ import annotations
 
@@ -26,27 +26,29 @@ from artde_gym.errors import OptionError
 
 def train(
     env: Annotated[str, typer.Option(help="Environment id.")],
-    out: Annotated[Path, typer.Option(help="The run's folder; the same command continues an interrupted run.")],
-    base: Annotated[str, typer.Option(help="Controller under the residual; none: the agent gives the force.")] = "tde",
+    out: Annotated[Path, typer.Option(help="The run's folder; re-run the command to resume.")],
+    base: Annotated[
+        str, typer.Option(help="Controller below the residual; none: the agent commands the force.")
+    ] = "tde",
     algo: Annotated[str, typer.Option(help="ppo, sac, or cma-es for the biped's linear balance law.")] = "ppo",
-    steps: Annotated[int, typer.Option(help="Decisions of the agent, all environments together.")] = 1_000_000,
+    steps: Annotated[int, typer.Option(help="Decisions of the agent, summed over environments.")] = 1_000_000,
     seed: Seed = 0,
-    workers: Annotated[int | None, typer.Option(help="Processes of environments. Default: all cores.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Number of environment processes. Default: all cores.")] = None,
     action_mode: Annotated[
-        str, typer.Option(help="What an action means. Default: the robot's; see the model cards.")
+        str, typer.Option(help="Meaning of an action. Default: the robot's; see the model cards.")
     ] = "",
     action_scale: Annotated[float, typer.Option(help="Largest residual. Default: the action mode's.")] = 0.0,
     channel: Annotated[str | None, typer.Option(hidden=True)] = None,
     limit: Annotated[float | None, typer.Option(hidden=True)] = None,
     gated: Annotated[bool, typer.Option(help="Fade the biped's residual in by tilt and velocity error.")] = True,
-    patience: Annotated[int, typer.Option(help="Held-out tests without a better score that end the run.")] = 20,
-    test_every: Annotated[int, typer.Option(help="Intervals (or generations) between two held-out tests.")] = 4,
+    patience: Annotated[int, typer.Option(help="Stop after this many held-out tests without a better score.")] = 20,
+    test_every: Annotated[int, typer.Option(help="Intervals (or generations) between held-out tests.")] = 4,
     engine: Engine = None,
     env_kwargs: EnvKwargs = None,
-    options: Annotated[str | None, typer.Option(help="JSON, arguments of the algorithm.")] = None,
+    options: Annotated[str | None, typer.Option(help="JSON; arguments of the algorithm.")] = None,
     report: Report = False,
 ) -> None:
-    """Train a residual on a controller; killed at any moment, the same command continues from its last checkpoint."""
+    """Train a residual on a controller. Re-run the command to resume from the last checkpoint."""
     from baselines.residual_config import ResidualConfig  # torch is heavy, and may not be installed
     from baselines.run import Progress as TrainingProgress
     from baselines.run import Training
@@ -77,7 +79,7 @@ def train(
     shown = bar.add_task("", total=steps)
 
     def on_progress(news: TrainingProgress) -> None:
-        bar.start()  # with the first news; an error before it leaves no empty bar
+        bar.start()  # with the first update, so that an earlier error leaves no empty bar
         bar.update(shown, completed=news.steps, total=news.wanted, description=news.text)
 
     try:
@@ -91,7 +93,7 @@ def train(
 
 
 def _trainer(algo: str) -> Callable[..., Path]:
-    """Find the function that trains with an algorithm; torch is heavy, and may not be installed."""
+    """Return the training function of an algorithm; torch is heavy and may not be installed."""
     try:
         if algo == "cma-es":
             from baselines.tune_balance import tune as go
@@ -100,5 +102,5 @@ def _trainer(algo: str) -> Callable[..., Path]:
     except ModuleNotFoundError as error:
         if error.name not in ("cmaes", "stable_baselines3", "torch", "tensorboard"):
             raise
-        raise OptionError("algo", algo, "what is installed; pip install 'artde-gym[rl]'") from error
+        raise OptionError("algo", algo, "an installed algorithm: pip install 'artde-gym[rl]'") from error
     return go

@@ -1,4 +1,4 @@
-"""`artde-gym tune`: gains, with the same budget for every controller."""
+"""`artde-gym tune`: tuning of gains with the same budget for every controller."""
 
 from __future__ import annotations
 
@@ -32,13 +32,11 @@ from artde_gym.studies.tune.console import print_tuning
 
 def tune(
     controllers: Controllers = "tde,atde,artde",
-    scenario: Annotated[str | None, typer.Option(help="Name; see `list`. Default: none, with --env as it is.")] = None,
+    scenario: Annotated[str | None, typer.Option(help="Name; see `list`. Default: none, just --env.")] = None,
     env: Annotated[str | None, typer.Option(help=f"Environment id. Default: the scenario's, or {WALK}.")] = None,
-    trials: Annotated[int, typer.Option(help="Sets of gains that each controller may try, its preset included.")] = 50,
-    episodes: Annotated[int, typer.Option(help="Seeded training episodes of each trial.")] = 4,
-    held_out: Annotated[
-        int, typer.Option(help="Seeded episodes of the comparison in the end, none of them seen.")
-    ] = 20,
+    trials: Annotated[int, typer.Option(help="Sets of gains per controller, including its preset.")] = 50,
+    episodes: Annotated[int, typer.Option(help="Seeded training episodes per trial.")] = 4,
+    held_out: Annotated[int, typer.Option(help="Unseen seeded episodes of the final comparison.")] = 20,
     seed: Seed = 0,
     workers: Workers = None,
     out: Out = None,
@@ -49,7 +47,7 @@ def tune(
     env_kwargs: EnvKwargs = None,
     allow_mixed: AllowMixed = False,
 ) -> None:
-    """Tune gains with the same budget for every controller; the same command continues an interrupted run."""
+    """Tune gains with the same budget for every controller. Re-run the command to resume."""
     kwargs = environment_kwargs(env_kwargs, engine)
     console = terminal()
     with Display(console) as display:

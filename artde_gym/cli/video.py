@@ -1,4 +1,4 @@
-"""`artde-gym video`: an episode to look at."""
+"""`artde-gym video`: video of an episode."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ from artde_gym.cli.display import terminal, words
 
 
 def video(
-    out: Annotated[Path, typer.Option(help="File: .mp4 or .webm (with ffmpeg), .gif, .webp, or .png for one picture.")],
+    out: Annotated[Path, typer.Option(help="File: .mp4 or .webm (with ffmpeg), .gif, .webp, or .png for one frame.")],
     controllers: Controllers = "artde",
-    scenario: Annotated[str | None, typer.Option(help="Name; see `list`. Default: none, with --env as it is.")] = None,
+    scenario: Annotated[str | None, typer.Option(help="Name; see `list`. Default: none, just --env.")] = None,
     env: Annotated[str | None, typer.Option(help=f"Environment id. Default: the scenario's, or {WALK}.")] = None,
     seed: Seed = 0,
-    episode: Annotated[int, typer.Option(help="Which episode of `evaluate` with this seed.")] = 0,
-    start: Annotated[float, typer.Option(help="Beginning of the part that is shown (s).")] = 0.0,
-    end: Annotated[float, typer.Option(help="Its end (s).", show_default=False)] = math.inf,
-    speed: Annotated[float, typer.Option(help="0.5 shows it half as fast.")] = 1.0,
-    fps: Annotated[float, typer.Option(help="Pictures a second.")] = 30.0,
-    width: Annotated[int, typer.Option(help="Pixels of one controller's panel; its height is 3/4 of it.")] = 640,
-    columns: Annotated[int | None, typer.Option(help="Panels in a row. Default: all.")] = None,
+    episode: Annotated[int, typer.Option(help="Index of the episode in `evaluate` with this seed.")] = 0,
+    start: Annotated[float, typer.Option(help="Start of the shown part (s).")] = 0.0,
+    end: Annotated[float, typer.Option(help="End of the shown part (s).", show_default=False)] = math.inf,
+    speed: Annotated[float, typer.Option(help="Playback speed; 0.5 is half as fast as real time.")] = 1.0,
+    fps: Annotated[float, typer.Option(help="Frames per second.")] = 30.0,
+    width: Annotated[int, typer.Option(help="Width of one controller's tile (pixels); its height is 3/4 of it.")] = 640,
+    columns: Annotated[int | None, typer.Option(help="Tiles per row. Default: all.")] = None,
     engine: Engine = None,
     disturbances: Disturbances = None,
     env_kwargs: EnvKwargs = None,
     gains: Gains = None,
 ) -> None:
-    """Show one or several controllers, side by side, in an episode of `evaluate`."""
+    """Make a video of an episode of `evaluate` with one or several controllers side by side."""
     from artde_gym.video import video as make_video  # only when asked for
 
     console = terminal()

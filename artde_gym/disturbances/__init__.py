@@ -1,4 +1,4 @@
-"""What happens to a robot beyond its own dynamics, as data: one JSON-able grammar for all environments."""
+"""Disturbances of a robot as data, in one JSON-able grammar for all environments."""
 
 from artde_gym.disturbances.grammar import Disturbances
 from artde_gym.disturbances.kinds import (

@@ -1,4 +1,4 @@
-"""`python -m artde_gym.disturbances > docs/disturbances.md` writes the page of the grammar from its own tables."""
+"""Generator of the page of the grammar: `python -m artde_gym.disturbances > docs/disturbances.md`."""
 
 from artde_gym.disturbances.kinds import page
 

@@ -1,4 +1,4 @@
-"""What lies between a commanded torque and the torque that acts: delay, lost actuators, motor lag."""
+"""Actuator model: delay, partial failure and lag between commanded and applied torques."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from artde_gym.multibody.lag import follow, lag_shares
 
 
 class Actuation:
-    """Turns commands into acting torques; `start` begins an episode.
+    """The actuators of a robot in one episode, which `start` begins.
 
     Args:
-        sampled: drawn disturbances, of which "action_delay", "actuator_effectiveness" and "motor_lag" matter here.
+        sampled: sampled disturbances; "action_delay", "actuator_effectiveness" and "motor_lag" are used.
         joints: names of the actuated joints, in the order of commands.
-        time_step: of the physics (s).
+        time_step: physics time step (s).
     """
 
     KINDS = ("action_delay", "actuator_effectiveness", "motor_lag")
@@ -35,17 +35,17 @@ class Actuation:
         self._acting = np.zeros(len(joints))
 
     def start(self, tau: Array) -> None:
-        """Begin with `tau` (n,) (Nm) acting, as it did for ever before."""
+        """Begin in the steady state for torques `tau` (n,) (Nm)."""
         self._late = deque([tau] * self._delay)
         self._acting = tau
 
     def target(self, command: Array) -> Array:
-        """What the motors aim at during a control period that begins with `command` (n,) (Nm)."""
+        """Return the motors' target torques for a control period that begins with `command` (n,) (Nm)."""
         self._late.append(command)
         return self._late.popleft()
 
     def advance(self, target: Array, step: int) -> Array:
-        """Mean torques (n,) (Nm) over physics step `step`, counted from the start of the episode."""
+        """Return the mean torques (n,) (Nm) over physics step `step` of the episode."""
         if self._losses:
             target = target.copy()
             for joint, factor, first in self._losses:

@@ -1,4 +1,4 @@
-"""Effects of registered kinds on n robots at once; a single environment is the case n = 1."""
+"""Effects of registered kinds of disturbances on n robots; a single environment has n = 1."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _NO_LOAD = Load()
 
 
 class _Group(NamedTuple):
-    """Robots on which one kind acts, and its values: one row a robot."""
+    """Robots on which one kind acts, and its values with one row per robot."""
 
     kind: str
     robots: NDArray[np.intp]
@@ -36,7 +36,7 @@ class Effects:
         words: names of the robot's sites and joints.
 
     Attributes:
-        acting: robots (n,) on which any effect acts.
+        acting: mask (n,) of the robots on which any effect acts.
     """
 
     def __init__(self, n: int, words: Words) -> None:
@@ -58,10 +58,10 @@ class Effects:
             self.acting[robot] = bool(entries)
 
     def load(self, states: RobotStates) -> Load:
-        """Compute the loads during the next physics step on all robots; of kinds that give none, None.
+        """Compute the loads on all robots in the next physics step; None for parts that no effect returns.
 
         Raises:
-            DisturbanceError: if an effect gives anything but a `Load`, or an array of another shape.
+            DisturbanceError: if an effect returns anything but a `Load`, or an array of the wrong shape.
         """
         if self._groups is None:
             self._groups = self._grouped()
@@ -76,13 +76,13 @@ class Effects:
         return Load(**total)
 
     def apply(self, world: World, state: State, time: float) -> Array | float:
-        """Load the base of the only robot for a physics step; returns torques (joints,) (Nm) to be added, or 0."""
+        """Apply loads to the base of the only robot for a physics step; return torques (joints,) (Nm) to add, or 0."""
         load = self.load_of(state, time)
         load_base(world, load, 0)
         return 0.0 if load.tau is None else load.tau[0]
 
     def load_of(self, state: State, time: float) -> Load:
-        """Compute the loads on the only robot, in a state at a time (s) of its episode."""
+        """Compute the loads on the only robot in a state at a time (s) of its episode."""
         if not self.acting[0]:
             return _NO_LOAD
         return self.load(RobotStates(*(np.array([part]) for part in (time, *state))))
@@ -92,7 +92,7 @@ class Effects:
         return {p.name: number_of(p, entry[p.name], self._words) for p in parameters}
 
     def _grouped(self) -> list[_Group]:
-        """Gather the entries that one call can compute: of the same kind, number and parameters."""
+        """Group the entries that one call can compute: those with the same kind, index and parameters."""
         groups: dict[Any, tuple[list[int], list[Numbers]]] = {}
         for robot, entries in enumerate(self._sampled):
             for kind, number, values in entries:
@@ -114,7 +114,7 @@ def _load_of(group: _Group, some: RobotStates) -> Load:
 
 
 def load_base(world: World, load: Load, robot: int) -> None:
-    """Load the base of one of n robots for the next physics step."""
+    """Apply a load to the base of one of n robots for the next physics step."""
     if load.force is not None or load.torque is not None:
         parts = (_NOTHING if part is None else part[robot].tolist() for part in (load.force, load.torque))
         (fx, fy, fz), (x, y, z) = parts

@@ -1,11 +1,11 @@
-"""Reading, checking and drawing disturbances.
+"""Parsing, validation and sampling of disturbances.
 
     {"payload": 1.3,
      "push": [{"body": "chest", "magnitude": {"uniform": [5, 40]}, "direction": [1, 0, 0], "start": 28.0}],
      "friction": {"coefficient": {"choice": [0.7, 0.8, 0.9]}}}
 
-In place of any number stands a number or a distribution: {"uniform": [low, high]}, {"normal": [mean, std]} (drawn
-again until it lies in the allowed range) or {"choice": [...]}, whose items are vectors where the parameter is one.
+Any number may be a distribution: {"uniform": [low, high]}, {"normal": [mean, std]} (truncated to the allowed range by
+resampling) or {"choice": [...]}, whose items are vectors if the parameter is a vector.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from artde_gym.disturbances.kinds import ALL, DISTURBANCES, NEVER, DisturbanceSp
 from artde_gym.errors import DisturbanceError, suggest_names
 
 DISTRIBUTIONS = ("uniform", "normal", "choice")
-NORMAL_DRAWS = 1000  # then the mean, which is in range: a normal much wider than its range is no endless loop
+NORMAL_DRAWS = 1000  # tries to hit the allowed range before the mean, which is in it, is used
 
 
 @dataclasses.dataclass(frozen=True)
 class Disturbances:
-    """Checked disturbances of one robot; build them with `parse`.
+    """Validated disturbances of one robot; build them with `parse`.
 
     `entries` holds (kind, {parameter: value or distribution}) with all defaults filled in, in a fixed order,
-    so that the same seed draws the same values however the user ordered the keys.
+    so that a seed gives the same samples for any order of the user's keys.
     """
 
     entries: tuple[tuple[str, Mapping[str, Any]], ...] = ()
@@ -44,17 +44,17 @@ class Disturbances:
         joints: Collection[str] = (),
         robot: str | None = None,
     ) -> Disturbances:
-        """Check `given` against the grammar.
+        """Parse and validate a user's disturbances.
 
         Args:
-            given: as a user wrote it.
-            sites: of the robot, to be pushed at.
-            joints: of the robot, or its rotors.
-            robot: one of `artde_gym.kit.ROBOTS`, for its kinds and defaults; without, any kind is read.
+            given: disturbances in the grammar.
+            sites: names of the robot's sites for pushes.
+            joints: names of the robot's joints or rotors.
+            robot: one of `artde_gym.kit.ROBOTS`, for its kinds and defaults; None: any kind is accepted.
 
         Raises:
-            DisturbanceError: for an unknown kind, key or site, a kind that the robot does not honor, a wrong type, a
-                value out of range or not finite.
+            DisturbanceError: for an unknown kind, key or site, a kind that the robot does not support, a wrong type, or
+                a value that is out of range or not finite.
         """
         if given is None:
             return cls()
@@ -64,7 +64,7 @@ class Disturbances:
         honored = [kind.name for kind in DISTURBANCES.values() if kind.honored_by(robot)]
         for name in named:
             if name not in honored:
-                of_robot = f"{robot} honors " if name in DISTURBANCES else ""
+                of_robot = f"{robot} supports " if name in DISTURBANCES else ""
                 raise DisturbanceError("disturbances", name, of_robot + suggest_names(name, honored))
         entries: list[tuple[str, Mapping[str, Any]]] = []
         for kind in in_order():
@@ -75,7 +75,7 @@ class Disturbances:
         return cls(tuple(entries))
 
     def sample(self, rng: np.random.Generator) -> dict[str, Any]:
-        """Sampled values, in the same grammar: `Disturbances.parse` reads them back."""
+        """Return sampled values in the same grammar, which `Disturbances.parse` reads."""
         sampled: dict[str, Any] = {}
         for name, entry in self.entries:
             values = {
@@ -90,19 +90,19 @@ class Disturbances:
         return sampled
 
     def draw(self, rng: np.random.Generator) -> dict[str, Any]:
-        """Return `sample(rng)`, under its old name."""
+        """Return `sample(rng)`; deprecated."""
         warn("Disturbances.draw", "Disturbances.sample")
         return self.sample(rng)
 
     def idle(self, duration: float) -> list[str]:
-        """Tell which kinds can never happen in an episode of `duration` seconds, and why."""
+        """Return which kinds can never happen in an episode of `duration` seconds, and why."""
         never: dict[str, set[str]] = {}
         for name, entry in self.entries:
             never.setdefault(name, set()).add(_idle(entry, duration))
         return [f"{name} can never happen: {' or '.join(sorted(why))}" for name, why in never.items() if "" not in why]
 
     def to_json(self) -> str:
-        """The disturbances as JSON that `parse` reads back."""
+        """Return the disturbances as JSON that `parse` reads."""
         grouped: dict[str, Any] = {}
         for name, entry in self.entries:
             if DISTURBANCES[name].multiple:
@@ -113,7 +113,7 @@ class Disturbances:
 
 
 def _idle(entry: Mapping[str, Any], duration: float) -> str:
-    """Say why an entry can never happen; "" if it can."""
+    """Return why an entry can never happen; "" if it can."""
     begin = min(_range(entry.get("start", entry.get("attach_time", 0.0))))
     if begin >= duration:
         return f"begins at {begin:g} s and the episode ends at {duration:g} s"
@@ -123,7 +123,7 @@ def _idle(entry: Mapping[str, Any], duration: float) -> str:
 
 
 def _range(value: Any) -> list[float]:
-    """Numbers between which a checked number or distribution lies."""
+    """Return numbers that bound a validated number or distribution."""
     if not isinstance(value, dict):
         return [value]
     ((kind, arguments),) = value.items()
@@ -141,7 +141,7 @@ def _entries(kind: DisturbanceSpec, given: Any) -> list[tuple[str, Any]]:
 
 
 def _each_joint(entry: dict[str, Any], joints: Collection[str]) -> list[dict[str, Any]]:
-    """One entry a joint where the given one names "all" of them, so that each draws a value of its own."""
+    """Expand an entry for "all" joints to one per joint, so that each is sampled separately."""
     return [{**entry, "joint": joint} for joint in joints] if entry.get("joint") == ALL else [entry]
 
 
@@ -179,7 +179,7 @@ def _word(value: Any, parameter: Parameter, field: str, words: Mapping[str, Coll
 
 
 def _check(value: Any, parameter: Parameter, field: str) -> Any:
-    """The value with plain floats in place of whatever number types came in."""
+    """Validate a value and convert its numbers to floats."""
     if _is_distribution(value):
         ((kind, arguments),) = value.items()
         return {kind: _check_distribution(kind, arguments, parameter, field)}
@@ -231,7 +231,7 @@ def _draw(value: Any, parameter: Parameter, rng: np.random.Generator) -> Any:
             drawn = [_draw(item, parameter, rng) for item in value]
             if any(drawn) or not parameter.nonzero:
                 return drawn
-        return [1.0, *[0.0] * (parameter.size - 1)]  # next to no chance of another vector that is allowed
+        return [1.0, *[0.0] * (parameter.size - 1)]  # a nonzero vector has next to no chance
     if not isinstance(value, dict):
         return value
     ((kind, arguments),) = value.items()
@@ -260,5 +260,5 @@ def _is_distribution(value: Any) -> bool:
 
 
 def _may_be_nonzero(component: Any) -> bool:
-    """Whether a checked number or distribution can give anything but zero."""
+    """Return True if a validated number or distribution can be nonzero."""
     return any(next(iter(component.values()))) if isinstance(component, dict) else component != 0

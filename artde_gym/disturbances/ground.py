@@ -1,4 +1,4 @@
-"""The ground reaction pulse: an extra force on the foot that lands."""
+"""Ground reaction pulse: an extra force on the landing foot."""
 
 from __future__ import annotations
 
@@ -13,42 +13,42 @@ from artde_gym.arrays import Array
 from artde_gym.multibody.dynamics import GRAVITY
 from artde_gym.multibody.spec import RobotSpec
 
-LOADED = 1.0  # N, from which on a foot touches the ground
-CARRIED = 1e-6  # share of the weight, below which the plan takes a foot off: its blends end a rounding off zero
-AIRBORNE = 0.25  # s without load that make a swing; a foot that has just landed bounces for up to 0.2 s
+LOADED = 1.0  # N, smallest normal force of a foot in contact
+MIN_LOAD_SHARE = 1e-6  # share of the weight below which a foot is planned to swing; blends end within rounding of zero
+AIRBORNE = 0.25  # s, shortest unloaded time of a swing; a foot bounces for up to 0.2 s after landing
 
 
 class GrfPulses:
-    """Upward forces on both feet of `n` robots, one pulse for each landing; `begin` starts an episode of one robot.
+    """Upward forces on both feet of `n` robots, one pulse per landing; `begin` starts an episode of one robot.
 
     half_sine     A sin(pi x)                       double_hump     A (sin(pi x) + q sin(3 pi x))
     with x = time since the landing / duration, 0 to 1. Source: Dantu 2023, section 2.5.2.
 
-    Each swing of the plan ends in one landing at most. With the trigger "plan" that is when the plan puts load on the
-    foot again; with "contact" when the ground first carries the foot after `AIRBORNE` s of that swing in the air. A
-    pulse that lifts the foot on which the robot stands does therefore not start another one.
+    Each swing of the plan ends in at most one landing: with the trigger "plan" when the plan loads the foot again, with
+    "contact" at the foot's first contact after `AIRBORNE` s of that swing without load. Hence a pulse that lifts the
+    stance foot does not trigger another one.
 
     Args:
         n: number of robots.
-        load_left: share of the weight that the plan puts on the left foot, one value a time step.
-        time_step: of the physics (s).
+        load_left: planned share of the weight on the left foot, one value per time step.
+        time_step: physics time step (s).
     """
 
     def __init__(self, n: int, load_left: Array, time_step: float) -> None:
-        carried = np.stack([load_left, 1.0 - load_left], axis=1) > CARRIED
+        carried = np.stack([load_left, 1.0 - load_left], axis=1) > MIN_LOAD_SHARE
         before = np.concatenate([carried[:1], carried[:-1]])
         self._lifts, self._lands = before & ~carried, carried & ~before
         self._time_step = time_step
         self._swing = round(AIRBORNE / time_step)
         self._robots = np.arange(n)[:, None]
-        self._waves = np.zeros((n, 1))  # N, by robot and steps since the landing; the last one is zero
+        self._waves = np.zeros((n, 1))  # N, by robot and steps since the landing; the last value is zero
         self._by_plan = np.zeros((n, 1), np.bool_)
         self._due = np.zeros((n, 2), np.bool_)  # feet whose swing has not ended yet
         self._unloaded = np.zeros((n, 2), np.int64)  # steps
         self._since = np.zeros((n, 2), np.int64)  # steps
 
     def begin(self, robot: int, entry: Mapping[str, Any] | None, spec: RobotSpec) -> None:
-        """Start an episode of a robot with a sampled disturbance, or without one; a share is one of its weight."""
+        """Start an episode of a robot with a sampled disturbance or None; a share is that of its weight."""
         wave = np.zeros(1) if entry is None else _wave(entry, spec.mass * GRAVITY, self._time_step)
         longer = len(wave) - self._waves.shape[1]
         if longer > 0:
@@ -60,7 +60,7 @@ class GrfPulses:
         self._since[robot] = self._waves.shape[1]  # long ago
 
     def forces(self, loads: Array, steps: NDArray[np.integer[Any]]) -> Array:
-        """Compute forces (n, 2) (N) during the time `steps` (n,) of each robot, from `loads` (n, 2) (N) just before."""
+        """Compute forces (n, 2) (N) in each robot's time step `steps` (n,) from the `loads` (n, 2) (N) before it."""
         steps = np.minimum(steps, len(self._lifts) - 1)
         lifts, carried = self._lifts[steps], loads > LOADED
         self._due |= lifts
@@ -72,7 +72,7 @@ class GrfPulses:
 
 
 def _wave(entry: Mapping[str, Any], weight: float, time_step: float) -> Array:
-    """Force (N) in each time step after a landing, and a zero."""
+    """Return the force (N) in each time step after a landing, followed by a zero."""
     magnitude = entry["magnitude"] if "magnitude" in entry else entry["share"] * weight
     third = entry["q"] if entry["shape"] == "double_hump" else 0.0
     x = time_step * np.arange(math.ceil(entry["duration"] / time_step)) / entry["duration"]

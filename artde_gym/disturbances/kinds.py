@@ -1,4 +1,4 @@
-"""The kinds of disturbances and their parameters: the one schema that checks, documents and draws them."""
+"""Kinds of disturbances and their parameters: the schema for validation, documentation and sampling."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from artde_gym.registry import Registry
 
 
 class RobotStates(NamedTuple):
-    """The states of n robots, as an effect sees them; of the base link's origin, in world axes.
+    """The states of n robots for effects; those of the base are of its link's origin, in world axes.
 
     Attributes:
-        time: since the start of each episode (n,) (s).
-        q, qd: of the actuated joints (n, joints) (rad, rad/s).
-        position, velocity: (n, 3) (m, m/s).
+        time: time since the start of each episode (n,) (s).
+        q, qd: positions and velocities of the actuated joints (n, joints) (rad, rad/s).
+        position, velocity: position and velocity of the base (n, 3) (m, m/s).
         quat_xyzw: attitude of the base (n, 4).
-        angular_velocity: of the base (n, 3) (rad/s).
+        angular_velocity: angular velocity of the base (n, 3) (rad/s).
     """
 
     time: Array
@@ -34,12 +34,12 @@ class RobotStates(NamedTuple):
 
 
 class Load(NamedTuple):
-    """Loads on n robots, beside those of actuators and ground; None for none.
+    """Loads on n robots in addition to those of actuators and ground; None for none.
 
     Attributes:
-        tau: on the actuated joints (n, joints) (Nm).
-        force: at the center of mass of the base link (n, 3) (N), world axes.
-        torque: on the base link (n, 3) (Nm), world axes.
+        tau: torques on the actuated joints (n, joints) (Nm).
+        force: force at the center of mass of the base link (n, 3) (N), world axes.
+        torque: torque on the base link (n, 3) (Nm), world axes.
     """
 
     tau: Array | None = None
@@ -48,25 +48,26 @@ class Load(NamedTuple):
 
 
 Effect = Callable[[Mapping[str, Array], RobotStates], Load]
-"""Computes what a disturbance does during the next physics step, from its sampled values and the states of n robots.
+"""A function from sampled values and the states of n robots to a disturbance's loads in the next physics step.
 
-A value is (n,), or (n, size); a word is its place among those allowed. The function is pure: no memory, no randomness.
+A value is (n,) or (n, size); a word is its index among the allowed ones. The function is pure, without memory or
+randomness.
 """
 
 
 @renamed_arguments({"words": "choices"})
 @dataclasses.dataclass(frozen=True)
 class Parameter:
-    """One value of a disturbance.
+    """One parameter of a disturbance.
 
     Attributes:
         low, high: allowed range of each component.
-        default: used where the parameter is left out; None if it must be given.
+        default: default value; None if the parameter is required.
         size: number of components; 0 for a word.
-        nonzero: whether a vector of zeros is refused.
-        integer: whether the value is a whole number.
-        choices: allowed words, or "site" or "joint" for the names that the robot has; rotors count as joints.
-        smaller_is_harder: whether a robot is disturbed more by smaller values.
+        nonzero: True if a zero vector is invalid.
+        integer: True if the value is a whole number.
+        choices: allowed words, or "site" or "joint" for the robot's names; rotors count as joints.
+        smaller_is_harder: True if smaller values disturb a robot more.
     """
 
     name: str
@@ -88,11 +89,11 @@ class DisturbanceSpec:
     """A disturbance by name.
 
     Attributes:
-        requires: the capability of a robot that it takes.
-        shorthand: the parameter that a bare number stands for.
-        multiple: whether it takes a list of entries. Where it names a joint, "all" stands for one entry a joint.
+        requires: capability that a robot needs for it.
+        shorthand: parameter that a bare number sets.
+        multiple: True if it takes a list of entries. For a joint, "all" means one entry per joint.
         one_of: parameters of which exactly one is given; the others are absent.
-        effect: of a registered kind; environments act by themselves on those of this project.
+        effect: function of a registered kind; None for this project's kinds, which environments implement.
     """
 
     name: str
@@ -105,12 +106,12 @@ class DisturbanceSpec:
     effect: Effect | None = None
 
     def default_of(self, parameter: Parameter, robot: str | None) -> Any:
-        """Return a parameter's default for a robot, or for none in particular."""
+        """Return a parameter's default for a robot, or for no particular robot (None)."""
         own = {} if robot is None else ROBOTS[robot].defaults
         return own.get(f"{self.name}.{parameter.name}", parameter.default)
 
     def honored_by(self, robot: str | None) -> bool:
-        """Return whether a robot has what this takes; any kind may be read for no robot in particular."""
+        """Return True if a robot supports this kind; None supports any."""
         needed = {self.requires} if self.effect is None else {self.requires, "effects"}
         return robot is None or needed <= ROBOTS[robot].capabilities
 
@@ -146,17 +147,17 @@ OWN: dict[str, DisturbanceSpec] = {
                     "its center in the base frame",
                     size=3,
                 ),
-                _time("attach_time", 0.0, "from when; at 0 the episode starts in balance with it"),
-                _time("detach_time", NEVER, "until when; not after `attach_time`, it never appears"),
+                _time("attach_time", 0.0, "attachment; at 0 the episode starts in equilibrium with the payload"),
+                _time("detach_time", NEVER, "release; if not after `attach_time`, the payload never appears"),
             ),
             shorthand="mass",
             requires="payload",
         ),
         DisturbanceSpec(
             "push",
-            "A constant force for a while, in world axes.",
+            "A constant force for a limited time, in world axes.",
             (
-                _word("body", "site", "torso", "named site of the robot at which it acts"),
+                _word("body", "site", "torso", "site of the robot at which it acts"),
                 Parameter("magnitude", "N", 0.0, 500.0, None, "size of the force"),
                 Parameter(
                     "direction",
@@ -164,34 +165,34 @@ OWN: dict[str, DisturbanceSpec] = {
                     -1e3,
                     1e3,
                     (1.0, 0.0, 0.0),
-                    "along which it acts; any length. Two components {'normal': [0, 1]} and a zero make a uniform "
-                    "random direction in the ground plane",
+                    "direction of the force; any length. Two components {'normal': [0, 1]} and a zero give a uniformly "
+                    "random horizontal direction",
                     size=3,
                     nonzero=True,
                 ),
-                _time("start", None, "first instant"),
-                Parameter("duration", "s", 1e-3, 60.0, 0.2, "how long"),
+                _time("start", None, "start time"),
+                Parameter("duration", "s", 1e-3, 60.0, 0.2, "duration"),
             ),
             multiple=True,
             requires="sites",
         ),
         DisturbanceSpec(
             "grf_pulse",
-            "An extra upward force on the foot that lands, through its center of mass, one pulse a landing: the ground "
-            "reaction model of the thesis. The engine has contact forces of its own, so this counts them twice; off by "
-            "default. Exactly one of `magnitude` and `share` is given.",
+            "An extra upward force on the landing foot at its center of mass, one pulse per landing: the ground "
+            "reaction model of the thesis. Off by default, since the engine already simulates contact forces. Exactly "
+            "one of `magnitude` and `share` is given.",
             (
                 _word("shape", SHAPES, "half_sine", "A sin(pi x), or A (sin(pi x) + q sin(3 pi x)), x = t / duration"),
                 Parameter("magnitude", "N", 0.0, 500.0, None, "A"),
-                Parameter("share", "1", 0.0, 5.0, None, "A over the weight of the robot as specified, 88.15 N"),
-                Parameter("duration", "s", 0.005, 2.0, 0.1, "how long; for a double hump the stance, about 1 s"),
+                Parameter("share", "1", 0.0, 5.0, None, "A over the nominal weight of the robot, 88.15 N"),
+                Parameter("duration", "s", 0.005, 2.0, 0.1, "duration; for a double hump the stance's, about 1 s"),
                 Parameter("q", "1", -1.0, 1.0, 0.4, "depth between the humps"),
                 _word(
                     "trigger",
                     TRIGGERS,
                     "contact",
-                    "what starts a pulse: a foot's first contact after 0.25 s of its planned swing in the air, or the "
-                    "instant at which the plan puts load on it again",
+                    "start of a pulse: the foot's first contact after 0.25 s without load in its planned swing, or the "
+                    "time at which the plan loads it again",
                 ),
             ),
             shorthand="magnitude",
@@ -200,30 +201,34 @@ OWN: dict[str, DisturbanceSpec] = {
         ),
         DisturbanceSpec(
             "friction",
-            "Friction coefficient of the pair foot and ground.",
-            (Parameter("coefficient", "1", 0.01, 2.0, None, "instead of the nominal 0.8", smaller_is_harder=True),),
+            "Friction between feet and ground.",
+            (
+                Parameter(
+                    "coefficient", "1", 0.01, 2.0, None, "friction coefficient; nominal 0.8", smaller_is_harder=True
+                ),
+            ),
             shorthand="coefficient",
             requires="feet",
         ),
         DisturbanceSpec(
             "slope",
-            "A slope; gravity is tilted, so that heights and angles are measured from the ground.",
+            "A slope. Gravity is tilted, so that heights and angles are relative to the ground.",
             (
-                Parameter("pitch_deg", "deg", -20.0, 20.0, 0.0, "above zero the ground rises ahead"),
-                Parameter("roll_deg", "deg", -20.0, 20.0, 0.0, "above zero the ground rises to the left"),
+                Parameter("pitch_deg", "deg", -20.0, 20.0, 0.0, "slope; positive: the ground rises forward"),
+                Parameter("roll_deg", "deg", -20.0, 20.0, 0.0, "slope; positive: the ground rises to the left"),
             ),
             shorthand="pitch_deg",
             requires="feet",
         ),
         DisturbanceSpec(
             "wind",
-            "Moving air: a steady wind, ambient air that wanders (an Ornstein-Uhlenbeck process in each direction, "
-            "calm at the start), and the jet of a fan (Gaussian across its axis, its speed fluctuating likewise). It "
-            "acts through the rotors' drag; see `artde_gym.disturbances.wind`.",
+            "Moving air: a steady wind, ambient turbulence (an Ornstein-Uhlenbeck process in each direction, zero at "
+            "the start), and the jet of a fan (Gaussian across its axis, its speed another such process). It acts "
+            "through the rotors' drag; see `artde_gym.disturbances.wind`.",
             (
-                Parameter("scale", "1", 0.0, 10.0, 1.0, "times which all of it is stronger"),
+                Parameter("scale", "1", 0.0, 10.0, 1.0, "factor of all velocities"),
                 Parameter("steady", "m/s", -20.0, 20.0, (0.0, 0.0, 0.0), "velocity of the steady wind", size=3),
-                Parameter("ambient", "m/s", 0.0, 10.0, 0.5, "standard deviation of each component of the ambient air"),
+                Parameter("ambient", "m/s", 0.0, 10.0, 0.5, "standard deviation of each ambient component"),
                 Parameter("ambient_time", "s", 0.01, 100.0, 1.0, "its correlation time"),
                 Parameter("fan_speed", "m/s", 0.0, 20.0, 4.0, "mean speed on the jet's axis; 0 for no fan"),
                 Parameter("fan_position", "m", -10.0, 10.0, (0.9, 0.0, 0.7), "a point on the jet's axis", size=3),
@@ -233,7 +238,7 @@ OWN: dict[str, DisturbanceSpec] = {
                     -1e3,
                     1e3,
                     (0.0, 1.0, 0.0),
-                    "along which the jet blows; any length",
+                    "direction of the jet; any length",
                     size=3,
                     nonzero=True,
                 ),
@@ -248,14 +253,14 @@ OWN: dict[str, DisturbanceSpec] = {
         ),
         DisturbanceSpec(
             "ground_effect",
-            "Rotors lift more close above the ground; see `artde_gym.disturbances.ground_effect`.",
-            (Parameter("strength", "1", 0.0, 10.0, 1.0, "times which the published gain of thrust is larger"),),
+            "Rotors have more thrust close to the ground; see `artde_gym.disturbances.ground_effect`.",
+            (Parameter("strength", "1", 0.0, 10.0, 1.0, "factor of the published additional thrust"),),
             shorthand="strength",
             requires="rotors",
         ),
         DisturbanceSpec(
             "sensor_noise",
-            "White Gaussian noise on measurements, by standard deviation.",
+            "White Gaussian noise on measurements, given by standard deviations.",
             (
                 Parameter("position", "rad or m", 0.0, 0.1, 0.0, "joint angles (rad), or a vehicle's position (m)"),
                 Parameter(
@@ -267,55 +272,55 @@ OWN: dict[str, DisturbanceSpec] = {
                     "joint velocities (rad/s), or a vehicle's velocity (m/s)",
                 ),
                 Parameter("tilt", "rad", 0.0, 0.5, 0.0, "roll and pitch of the base, or a vehicle's whole attitude"),
-                Parameter("angular_velocity", "rad/s", 0.0, 10.0, 0.0, "of the base or vehicle"),
+                Parameter("angular_velocity", "rad/s", 0.0, 10.0, 0.0, "angular velocity of the base or vehicle"),
             ),
             shorthand="position",
             requires="sensors",
         ),
         DisturbanceSpec(
             "encoder_bits",
-            "Joint encoders of so many counts a turn; joint velocities are then differences of counts.",
-            (Parameter("bits", "1", 6, 32, None, "2^bits counts a turn", integer=True, smaller_is_harder=True),),
+            "Joint encoders of finite resolution; joint velocities are then differences of counts.",
+            (Parameter("bits", "1", 6, 32, None, "2^bits counts per turn", integer=True, smaller_is_harder=True),),
             shorthand="bits",
             requires="encoders",
         ),
         DisturbanceSpec(
             "action_delay",
-            "Commands act late.",
-            (Parameter("steps", "1", 0, 100, None, "by so many control periods", integer=True),),
+            "Commands act with a delay.",
+            (Parameter("steps", "1", 0, 100, None, "number of control periods", integer=True),),
             shorthand="steps",
             requires="actuators",
         ),
         DisturbanceSpec(
             "motor_lag",
             "Torques, or thrusts of rotors, follow commands as a first-order lag.",
-            (Parameter("time_constant", "s", 0.0, 1.0, None, "of the lag; for rotors in place of their own 0.035 s"),),
+            (Parameter("time_constant", "s", 0.0, 1.0, None, "time constant; rotors have 0.035 s by default"),),
             shorthand="time_constant",
             requires="actuators",
         ),
         DisturbanceSpec(
             "actuator_effectiveness",
-            "A joint gives a share of the commanded torque only, or a rotor a share of its thrust.",
+            "A joint has only a share of the commanded torque, or a rotor of its thrust.",
             (
-                _word("joint", "joint", None, f"which one, or {ALL!r}"),
-                Parameter("factor", "1", 0.0, 1.0, 0.0, "share that is left", smaller_is_harder=True),
-                _time("start", 0.0, "from when"),
+                _word("joint", "joint", None, f"joint or rotor, or {ALL!r}"),
+                Parameter("factor", "1", 0.0, 1.0, 0.0, "remaining share", smaller_is_harder=True),
+                _time("start", 0.0, "start time"),
             ),
             multiple=True,
             requires="actuators",
         ),
         DisturbanceSpec(
             "mass_scale",
-            "The robot is heavier or lighter than the nominal model, in all links, inertia included.",
+            "The robot is heavier or lighter than the nominal model, in the masses and inertias of all links.",
             (Parameter("factor", "1", 0.5, 2.0, None, "true over nominal mass"),),
             shorthand="factor",
             requires="mass",
         ),
         DisturbanceSpec(
             "initial_pose",
-            "The episode starts off the reference pose.",
+            "The episode starts with an offset from the reference pose.",
             (
-                _word("joint", "joint", ALL, f"which one, or {ALL!r}"),
+                _word("joint", "joint", ALL, f"joint, or {ALL!r}"),
                 Parameter("offset", "rad", -0.5, 0.5, None, "added to the reference angle"),
             ),
             multiple=True,
@@ -323,28 +328,28 @@ OWN: dict[str, DisturbanceSpec] = {
         ),
         DisturbanceSpec(
             "initial_position",
-            "The episode starts off the reference path, at rest.",
+            "The episode starts at rest with an offset from the reference path.",
             (Parameter("offset", "m", -0.3, 0.3, None, "added to the reference position", size=3),),
             requires="flight",
         ),
         DisturbanceSpec(
             "rotor_inertia",
-            'Rotors of another inertia than the nominal model\'s. It needs `actuator_inertia="rotor"`; `mass_scale` '
+            'Rotor inertia that differs from the nominal model\'s. Requires `actuator_inertia="rotor"`; `mass_scale` '
             "scales it, too.",
-            (Parameter("inertia", "kg m^2", 0.005, 0.5, None, "reflected to each leg joint, instead of 0.045"),),
+            (Parameter("inertia", "kg m^2", 0.005, 0.5, None, "reflected inertia of each leg joint; nominal 0.045"),),
             shorthand="inertia",
             requires="armature",
         ),
         DisturbanceSpec(
             "mass_distribution",
-            "Mass moves between the legs and the rest of the robot, inertia with it; the whole mass stays.",
-            (Parameter("legs", "1", 0.5, 1.5, None, "mass of each link of the legs over the nominal one"),),
+            "Mass and inertia moved between the legs and the rest of the robot; the total mass is unchanged.",
+            (Parameter("legs", "1", 0.5, 1.5, None, "true over nominal mass of each link of the legs"),),
             shorthand="legs",
             requires="legs",
         ),
         DisturbanceSpec(
             "contact",
-            "Softer or stiffer contact of feet and ground.",
+            "Softer or stiffer contact between feet and ground.",
             (
                 Parameter(
                     "time_constant",
@@ -352,8 +357,8 @@ OWN: dict[str, DisturbanceSpec] = {
                     0.002,
                     0.05,
                     None,
-                    "with which the ground pushes a foot out: in MuJoCo of its critically damped contacts (its own is "
-                    "0.005 s), in Bullet 0.001 s over the share of the depth that it corrects in that time (0.0125 s)",
+                    "time constant of the contact: in MuJoCo that of its critically damped contacts (default 0.005 s), "
+                    "in Bullet 0.001 s over the share of the depth corrected in that time (default 0.0125 s)",
                 ),
             ),
             shorthand="time_constant",
@@ -361,41 +366,41 @@ OWN: dict[str, DisturbanceSpec] = {
         ),
         DisturbanceSpec(
             "torque_limit",
-            "Actuators that saturate below the bounds of the action.",
+            "Actuators saturate below the bounds of the action.",
             (Parameter("limit", "Nm", 1.0, 40.0, None, "largest torque of each joint", smaller_is_harder=True),),
             shorthand="limit",
             requires="torque_limit",
         ),
     )
 }
-"""The kinds of this project by name."""
+"""This project's kinds by name."""
 
 DISTURBANCES: Registry[DisturbanceSpec] = Registry(
     "disturbance", "artde_gym.disturbances", lambda loaded: {kind.name: kind for kind in kinds_of(loaded)}, OWN
 )
-"""All kinds by name: those of this project, of plug-ins, and those registered."""
+"""All kinds by name: this project's, plug-ins' and registered ones."""
 
 
 def register_disturbance(kind: DisturbanceSpec, effect: Effect, *, replace: bool = False) -> None:
-    """Make a kind of disturbance known to the grammar, to environments and to the command line.
+    """Register a kind of disturbance for the grammar, environments and the command line.
 
-    Environments of robots that have its capability, and "effects", apply it from the first step of an episode on.
+    Environments of robots that have its capability and "effects" apply it from the first step of an episode on.
 
     Args:
         kind: its name and parameters.
-        effect: computes what it does to n robots.
-        replace: whether it may take the place of one of the same name.
+        effect: function that computes its loads on n robots.
+        replace: whether it may replace a kind of the same name.
 
     Raises:
-        OptionError: if its name is taken and `replace` is not given, or is one of this project's.
+        OptionError: if its name is taken and `replace` is not given, or belongs to this project.
     """
     if kind.name in OWN:
-        raise OptionError("disturbance", kind.name, f"a new name; these are taken: {', '.join(OWN)}")
+        raise OptionError("disturbance", kind.name, f"a name that is not taken, any except {', '.join(OWN)}")
     DISTURBANCES.register(kind.name, dataclasses.replace(kind, effect=effect), replace=replace)
 
 
 def kinds_of(loaded: Any) -> tuple[DisturbanceSpec, ...]:
-    """Check what an entry point of the group `artde_gym.disturbances` has brought: a kind with an effect, or several.
+    """Validate the object of an entry point of the group `artde_gym.disturbances`: kinds with effects.
 
     Raises:
         OptionError: if it is anything else.
@@ -404,20 +409,20 @@ def kinds_of(loaded: Any) -> tuple[DisturbanceSpec, ...]:
     for kind in kinds:
         if not (isinstance(kind, DisturbanceSpec) and kind.effect is not None):
             raise OptionError(
-                "entry point of artde_gym.disturbances", kind, "a Kind with an effect, or a tuple of them"
+                "entry point of artde_gym.disturbances", kind, "a DisturbanceSpec with an effect, or a tuple of them"
             )
     return kinds
 
 
 def in_order() -> list[DisturbanceSpec]:
-    """Return all kinds in the order in which their values are drawn, which is not that of their registration."""
+    """Return all kinds in the order of sampling, which differs from that of registration."""
     return [*OWN.values(), *(DISTURBANCES[name] for name in sorted(DISTURBANCES.keys() - OWN.keys()))]
 
 
 INTRODUCTION = """\
 # Disturbances
 
-What happens to a robot beyond its own dynamics, as data: one JSON-able grammar for all environments, accepted by
+Disturbances of a robot are data in one JSON-able grammar for all environments, accepted by
 `gymnasium.make(..., disturbances=...)`, by `env.reset(options={"disturbances": ...})` and by the command line.
 
     {"payload": 1.3,
@@ -425,21 +430,21 @@ What happens to a robot beyond its own dynamics, as data: one JSON-able grammar 
      "friction": {"coefficient": {"choice": [0.7, 0.8, 0.9]}},
      "initial_pose": {"joint": "all", "offset": {"normal": [0, 0.001]}}}
 
-In place of any number stands a number or a distribution: `{"uniform": [low, high]}`, `{"normal": [mean, std]}` (drawn
-again until it lies in the allowed range) or `{"choice": [...]}`, whose items are vectors where the parameter is one.
-Values are drawn at each reset from the environment's own seeded generator; `env.unwrapped.sampled_disturbances` holds
-what was drawn, in the same grammar, and `info` the same as numbers (`disturbance.payload.mass`). What `reset` is given
-replaces the disturbances of this and the following episodes; nothing is merged.
+Any number may be a distribution: `{"uniform": [low, high]}`, `{"normal": [mean, std]}` (truncated to the allowed range
+by resampling) or `{"choice": [...]}`, whose items are vectors if the parameter is a vector. Values are sampled at each
+reset from the environment's seeded generator; `env.unwrapped.sampled_disturbances` has them in the same grammar, and
+`info` as numbers (`disturbance.payload.mass`). Disturbances passed to `reset` override those of this and the following
+episodes; nothing is merged.
 
 Several kinds act together; kinds marked *list* take several entries. Anything outside the grammar, or a kind that the
-environment's robot does not honor, raises `DisturbanceError` when the environment is made or reset, with the key, the
-value and what is allowed.
+robot does not support, raises `DisturbanceError` when the environment is made or reset, with the key, the value and
+what is allowed.
 
 """
 
 
 def page() -> str:
-    """The grammar as a Markdown page, from the tables that check it."""
+    """Return the grammar as a Markdown page."""
     lines = [f"| kind | {' | '.join(f'`{robot}`' for robot in ROBOTS)} |", "|---|" + "---|" * len(ROBOTS)]
     for kind in DISTURBANCES.values():
         marks = ("yes" if kind.honored_by(robot) else "" for robot in ROBOTS)
@@ -454,7 +459,7 @@ def page() -> str:
             if parameter.default is None:
                 default = "one of these" if parameter.name in kind.one_of else "required"
             default += "".join(f"; {robot}: `{value}`" for robot, value in other_defaults(kind, parameter).items())
-            text = parameter.text + (" (what a bare number stands for)" if parameter.name == kind.shorthand else "")
+            text = parameter.text + (" (set by a bare number)" if parameter.name == kind.shorthand else "")
             row = (f"`{parameter.name}`", parameter.unit, allowed(parameter), default, text)
             lines.append("| " + " | ".join(row) + " |")
         lines.append("")
@@ -462,7 +467,7 @@ def page() -> str:
 
 
 def parameters_of(kind: str, given: Any) -> dict[str, Any]:
-    """Return a disturbance's parameters, also from the short form of a bare number or distribution."""
+    """Return a disturbance's parameters, expanding the shorthand of a bare number or distribution."""
     if given is None:
         return {}
     scalar = DISTURBANCES[kind].shorthand
@@ -473,13 +478,13 @@ def parameters_of(kind: str, given: Any) -> dict[str, Any]:
 
 
 def other_defaults(kind: DisturbanceSpec, parameter: Parameter) -> dict[str, Any]:
-    """Return a parameter's defaults of robots that have another one than the kind."""
+    """Return the robots' defaults of a parameter that differ from the kind's."""
     path = f"{kind.name}.{parameter.name}"
     return {name: kit.defaults[path] for name, kit in ROBOTS.items() if path in kit.defaults}
 
 
 def allowed(parameter: Parameter) -> str:
-    """What a parameter accepts, in words."""
+    """Describe the valid values of a parameter."""
     if isinstance(parameter.choices, str):
         return f"a {parameter.choices} of the robot"
     if parameter.choices:

@@ -1,8 +1,8 @@
-"""Motion capture and inertial sensors, fused: what a vehicle in a laboratory knows of itself.
+"""State estimation of a vehicle in a laboratory by motion capture and an inertial measurement unit (IMU).
 
-Cameras give position and attitude 60 times a second, the inertial unit angular rate and specific force at every control
-period L; sensor errors are white and Gaussian. An observer goes along with the inertial unit and is corrected by the
-first sample after each frame:
+Cameras measure position and attitude at 60 Hz, the IMU angular rate and specific force at every control period L;
+sensor errors are white and Gaussian. An observer integrates the IMU and is corrected by the first sample after each
+camera frame:
 
 predict:   R <- R exp(L (w_k + w_{k-1}) / 2),   v' = v + L (R f - g),   p <- p + L (v + v') / 2,   v <- v'
 correct:   p <- p + alpha e,   v <- v + beta / T e,   R <- R exp(kappa e_R)        e, e_R = camera - observer
@@ -25,23 +25,23 @@ from artde_gym.disturbances.noise import Integers, normal_noise
 from artde_gym.multibody.dynamics import GRAVITY
 from artde_gym.sim.rigid_bodies import cross, rotate_frames, times, transposed_times
 
-FRAME = 1 / 60  # s
-POSITION_NOISE = 3e-4  # m, standard deviation of each component, as all that follow
+FRAME_PERIOD = 1 / 60  # s, camera period
+POSITION_NOISE = 3e-4  # m, standard deviation of each component, as for all that follow
 ATTITUDE_NOISE = math.radians(0.1)
 GYROSCOPE_NOISE = 0.005  # rad/s
 ACCELEROMETER_NOISE = 0.05  # m/s^2
 
 
 class Mocap:
-    """The observers of `n` vehicles that are sampled every `period` seconds."""
+    """The observers of `n` vehicles, sampled every `period` seconds."""
 
     def __init__(self, n: int, period: float, dtype: DTypeLike) -> None:
         self._period = period
         self._position = self._velocity = self._rates = self._true_velocity = np.zeros((3, n), dtype)
         self._rot = np.zeros((3, 3, n), dtype)
-        samples = max(FRAME / period, 1.0)  # between two corrections
+        samples = max(FRAME_PERIOD / period, 1.0)  # between two corrections
         interval = samples * period
-        drift = ACCELEROMETER_NOISE / math.sqrt(samples)  # as if constant from one correction to the next
+        drift = ACCELEROMETER_NOISE / math.sqrt(samples)  # as if constant between two corrections
         self._alpha, beta = tracking_gains(drift * interval**2 / POSITION_NOISE)
         self._beta_rate = beta / interval
         ratio = samples * (GYROSCOPE_NOISE * period / ATTITUDE_NOISE) ** 2
@@ -57,14 +57,14 @@ class Mocap:
         keys: Integers,
         new: NDArray[np.bool_] | None = None,
     ) -> None:
-        """Replace the truth by what is known of it.
+        """Replace the true state by its estimate.
 
         Args:
             position, velocity, rates: (3, n) (m, m/s, rad/s), changed in place.
             rot: body to world (3, 3, n), changed in place.
-            sample: how many control periods since the start of the episode (n,); at 0 the observer has settled.
-            keys: of each vehicle's noise (n,).
-            new: whether this sample is looked at for the first time (n,); all are without. The others' stay as known.
+            sample: number of control periods since the start of the episode (n,); at 0 the observer has settled.
+            keys: keys of each vehicle's noise (n,).
+            new: mask (n,) of vehicles whose sample is read for the first time; None: all. Others keep their estimate.
         """
         before = self._known()
         period = self._period
@@ -99,18 +99,18 @@ class Mocap:
 
 
 def tracking_gains(index: float) -> tuple[float, float]:
-    """Kalata's stationary gains alpha, beta for a tracking index std(acceleration) T^2 / std(position)."""
+    """Return Kalata's stationary gains alpha, beta for a tracking index std(acceleration) T^2 / std(position)."""
     root = (4 + index - math.sqrt(8 * index + index**2)) / 4
     alpha = 1 - root**2
     return alpha, 2 * (2 - alpha) - 4 * math.sqrt(1 - alpha)
 
 
 def _frame(sample: NDArray[np.int64], period: float) -> NDArray[np.int64]:
-    """Number of the last frame at a sample."""
-    return np.floor(sample * period / FRAME + 1e-6).astype(np.int64)
+    """Return the index of the last camera frame at a sample."""
+    return np.floor(sample * period / FRAME_PERIOD + 1e-6).astype(np.int64)
 
 
 def _turn_between(rot: Array, other: Array) -> Array:
-    """The small rotation vector (3, n) in body axes from one attitude to another."""
+    """Return the small rotation vector (3, n) in body axes from one attitude to another."""
     turn = cross(rot[:, 0], other[:, 0]) + cross(rot[:, 1], other[:, 1]) + cross(rot[:, 2], other[:, 2])
     return transposed_times(rot, 0.5 * turn)

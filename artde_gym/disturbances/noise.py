@@ -1,8 +1,8 @@
-"""White noise that depends on nothing but a key and an index: the same for one environment and for many at once.
+"""Counter-based white noise: a function of a key and an index, the same for one environment and for many at once.
 
 Output `index` of the stream `key` is SplitMix64's (G. Steele, D. Lea and C. Flood, "Fast splittable pseudorandom number
-generators", OOPSLA 2014). Nobody has to remember how far a stream was read, and thousands of streams are read in a few
-array operations, at a tenth of the price of as many generators.
+generators", OOPSLA 2014). Streams have no state, and thousands of them are read in a few array operations, at a tenth
+of the cost of as many generators.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ _TO_UNIT_VARIANCE = math.sqrt(12.0 / (2.0**32 - 1.0))  # of the 2^16 values of a
 
 
 def draw_keys(rng: np.random.Generator, count: int) -> Integers:
-    """Keys of so many new streams."""
+    """Draw keys of `count` new streams."""
     return rng.integers(2**64, size=count, dtype=np.uint64)
 
 
 def uniform_noise(keys: Integers, index: Integers, dtype: DTypeLike = np.float64) -> Array:
-    """Four uniform numbers of mean 0 and variance 1 for each key at each index, (4, ...) with their broadcast shape.
+    """Return four uniform numbers of mean 0 and variance 1 for each key and index, (4, ...) with their broadcast shape.
 
-    A filter makes them as Gaussian as normal numbers would be, and they cost far less.
+    After a filter they are nearly Gaussian, at a far lower cost than normal numbers.
     """
     bits = _random_bits(keys, index)
     integers = np.moveaxis(bits.view(np.int16).reshape(*bits.shape, 4), -1, 0)
@@ -39,7 +39,7 @@ def uniform_noise(keys: Integers, index: Integers, dtype: DTypeLike = np.float64
 
 
 def normal_noise(keys: Integers, index: Integers, size: int) -> Array:
-    """`size` standard normal numbers for each key at each index, (size, ...) with their broadcast shape."""
+    """Return `size` standard normal numbers for each key and index, (size, ...) with their broadcast shape."""
     numbers = np.arange(size, dtype=np.uint64).reshape(-1, *[1] * index.ndim)
     bits = _random_bits(keys, index * np.uint64(size) + numbers)
     return ndtri(((bits >> _SHIFTS[3]) + 0.5) * 2.0**-53)

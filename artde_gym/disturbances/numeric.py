@@ -1,9 +1,9 @@
-"""Sampled disturbances as numbers and arrays alone, as `info` has them.
+"""Sampled disturbances as numbers and arrays for `info`.
 
 `disturbance.payload.mass` is a number, `disturbance.payload.position` an array (3,). A kind that takes several entries
-has one array a parameter, an item an entry: `disturbance.push.magnitude` (entries,), `disturbance.push.direction`
-(entries, 3). A word is its position in `env.unwrapped.words`, by "site" or "joint", or among the words that the grammar
-allows; `env.unwrapped.sampled_disturbances` has the words themselves.
+has one array per parameter with one item per entry: `disturbance.push.magnitude` (entries,),
+`disturbance.push.direction` (entries, 3). A word is its index in `env.unwrapped.words`, by "site" or "joint", or among
+the words that the grammar allows; `env.unwrapped.sampled_disturbances` has the words themselves.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ Words = Mapping[str, Sequence[str]]
 
 
 def numeric(sampled: Mapping[str, Any], words: Words) -> dict[str, Any]:
-    """Name each number, words being replaced by numbers and lists of entries by arrays."""
+    """Return named numbers, with indices for words and arrays for lists of entries."""
     told: dict[str, Any] = {}
     for kind, value in sampled.items():
         entries = value if DISTURBANCES[kind].multiple else (value,)
         for parameter in DISTURBANCES[kind].parameters:
             if not all(parameter.name in entry for entry in entries):
-                continue  # one of several of which only one is given
+                continue  # one of the parameters of which only one is given
             told[f"disturbance.{kind}.{parameter.name}"] = (
                 np.array([number_of(parameter, entry[parameter.name], words) for entry in value])
                 if DISTURBANCES[kind].multiple
@@ -36,7 +36,7 @@ def numeric(sampled: Mapping[str, Any], words: Words) -> dict[str, Any]:
 
 
 def number_of(parameter: Parameter, value: Any, words: Words) -> Any:
-    """Return a sampled value as a number or an array; a word is its place among those allowed."""
+    """Return a sampled value as a number or an array; a word is its index among the allowed ones."""
     if parameter.size == 0:
         known = words[parameter.choices] if isinstance(parameter.choices, str) else parameter.choices
         return list(known).index(value)

@@ -1,4 +1,4 @@
-"""What happens at given times: pushes, and payloads that come and go."""
+"""Timed disturbances: pushes, and payloads that are attached and released."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ EVENTS = PUSH_BEGINS, PUSH_ENDS, ATTACHED, DROPPED = "push_begins", "push_ends",
 
 
 class Loaded(Protocol):
-    """What a schedule acts on: an engine's `World`, or the dynamics of a plug-in's own."""
+    """The target of a schedule: an engine's `World` or a plug-in's dynamics."""
 
     def apply_force(self, site: str, force: Vector) -> None: ...
     def attach_payload(self, mass: float, position: Vector) -> None: ...
@@ -22,7 +22,7 @@ class Loaded(Protocol):
 
 
 class Push(NamedTuple):
-    """A constant `force` (N, world axes) at a `site`, in time steps from `first` up to, not including, `end`."""
+    """A constant `force` (N, world axes) at a `site` in time steps `first` to `end` - 1."""
 
     site: str
     force: Vector
@@ -31,7 +31,7 @@ class Push(NamedTuple):
 
     @classmethod
     def of(cls, entry: Mapping[str, Any], time_step: float) -> Push:
-        """A sampled push, in steps of `time_step` (s)."""
+        """Convert a sampled push to steps of `time_step` (s)."""
         direction = np.asarray(entry["direction"])
         x, y, z = (entry["magnitude"] * direction / np.linalg.norm(direction)).tolist()
         first = round(entry["start"] / time_step)
@@ -54,17 +54,17 @@ class Schedule:
             self._add(round(self._payload["detach_time"] / time_step), DROPPED)
 
     def start(self, world: Loaded) -> None:
-        """Bring about what is there before the first step."""
+        """Apply everything that acts before the first step."""
         if self._payload.get("attach_time") == 0 and self._payload["detach_time"] > 0:
             self._attach(world)
 
     def add(self, push: Push) -> None:
-        """One more push than was drawn."""
+        """Add a push to the sampled ones."""
         self._announce(push)
         self._pushes.append(push)
 
     def drop(self, step: int) -> bool:
-        """Drop the payload at a step instead of later; False if it is not there then."""
+        """Drop the payload at a step instead of later; return False if it is not attached then."""
         time = step * self._time_step
         if not self._payload or not self._payload["attach_time"] <= time < self._payload["detach_time"]:
             return False
@@ -74,21 +74,21 @@ class Schedule:
         return True
 
     def quiet(self, first: int, end: int) -> bool:
-        """Whether nothing acts, begins or ends from step `first` up to, not including, `end`."""
+        """Return True if nothing acts, begins or ends in steps `first` to `end` - 1."""
         return not self._changes or self.next(first) >= end
 
     def next(self, step: int) -> int:
-        """The first step from `step` on in which something acts, begins or ends; `NEVER` if there is none."""
+        """Return the first step from `step` on in which something acts, begins or ends; `NEVER` if there is none."""
         if self.acting(step):
             return step
         return min((change for change in self._changes if change >= step), default=NEVER)  # every push begins and ends
 
     def acting(self, step: int) -> list[Push]:
-        """The pushes that act during a step."""
+        """Return the pushes that act during a step."""
         return [push for push in self._pushes if push.first <= step < push.end]
 
     def apply(self, step: int, world: Loaded) -> list[str]:
-        """Bring about what belongs to a step; returns which of `EVENTS` happen with it."""
+        """Apply the disturbances of a step; return its `EVENTS`."""
         events = self._changes.get(step, [])
         for event in events:
             if event == ATTACHED:

@@ -1,4 +1,4 @@
-"""What lies between the robot's state and its observation: noise and encoders."""
+"""Sensor model: noise and encoders between a robot's state and its observation."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from artde_gym.layout import Layout
 
 
 class Sensing:
-    """Disturbs observations in place; `start` begins an episode.
+    """The sensors of a robot in one episode, which `start` begins.
 
     Noise is white and Gaussian. An encoder rounds a (noisy) joint angle to its counts, and a joint velocity is then the
-    difference of two readings over the control period: what a controller with encoders has before any filter.
+    difference of two readings over the control period, without any filter.
 
     Args:
-        sampled: drawn disturbances, of which "sensor_noise" and "encoder_bits" matter here.
-        layout: of the observation.
-        period: of control (s).
-        rng: of the environment.
+        sampled: sampled disturbances; "sensor_noise" and "encoder_bits" are used.
+        layout: layout of the observation.
+        period: control period (s).
+        rng: generator of the environment.
     """
 
     KINDS = ("sensor_noise", "encoder_bits")
@@ -45,7 +45,7 @@ class Sensing:
         self._before: Array | None = None
 
     def disturb(self, observation: Array) -> Array:
-        """The observation as the sensors give it; changed in place and returned."""
+        """Replace an observation in place by its measurement and return it."""
         for part, deviation in self._noise:
             values = observation[part]
             values += self._rng.normal(0.0, deviation, values.shape)

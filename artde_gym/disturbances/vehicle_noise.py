@@ -1,4 +1,4 @@
-"""The disturbance `sensor_noise` on what a vehicle measures of itself."""
+"""The disturbance `sensor_noise` of vehicles."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class VehicleNoise:
         self._deviations = np.zeros((len(_NAMES), n), dtype)
 
     def begin(self, vehicle: int, sampled: Mapping[str, Any]) -> None:
-        """Begin an episode of one vehicle, with sampled disturbances."""
+        """Begin an episode of one vehicle with sampled disturbances."""
         noise = sampled.get("sensor_noise", {})
         self._deviations[:, vehicle] = [noise.get(name, 0.0) for name in _NAMES]
 

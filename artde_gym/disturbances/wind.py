@@ -3,13 +3,13 @@
 w = scale (steady + ambient + direction fan_speed exp(-r^2 / 2 fan_radius^2) (1 + turbulence))
 
 r is the distance from the jet's axis. The three components of `ambient` and `turbulence` are Ornstein-Uhlenbeck
-processes that start at zero, exactly discretised on a grid of `GRID`:
+processes that start at zero, discretized exactly on a grid of `GRID`:
 
 x_{k+1} = x_k exp(-GRID / T) + std sqrt(1 - exp(-2 GRID / T)) n_k        n white, mean 0, variance 1
 
-so that the wind depends on neither control period nor physics step. The noise is uniform: the process has the mean, the
-variance and the correlation that normal noise would give it, and its distribution is as good as normal (excess kurtosis
--0.06 for T = 0.1 s). Everything here is elementwise, on plain numbers for one vehicle or on arrays for many.
+so that the wind depends on neither control period nor physics step. The noise is uniform: the process has the same
+mean, variance and correlation as with normal noise, and a nearly normal distribution (excess kurtosis -0.06 for
+T = 0.1 s). Everything here is elementwise, on plain numbers for one vehicle or on arrays for many.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from artde_gym.arrays import Array
 from artde_gym.disturbances.noise import uniform_noise
 
 GRID = 0.005  # s
-BLOCK = 400  # grid points whose noise is read at once, for one vehicle
+BLOCK_SIZE = 400  # grid points whose noise is generated at once for one vehicle
 
 Number = TypeVar("Number", float, Array)
 Vector3 = tuple[Number, Number, Number]
@@ -32,7 +32,7 @@ Vector4 = tuple[Number, Number, Number, Number]
 
 
 class Air(NamedTuple, Generic[Number]):
-    """What of a wind does not change, in the form in which it is used, `scale` worked in; m/s and m."""
+    """Precomputed constants of a wind, with `scale` applied; m/s and m."""
 
     steady_x: Number
     steady_y: Number
@@ -50,7 +50,7 @@ class Air(NamedTuple, Generic[Number]):
 
 
 def air(wind: Mapping[str, Any] | None) -> Air[float]:
-    """The air of a sampled disturbance `wind`, or calm air."""
+    """Return the constants of a sampled disturbance `wind`, or of calm air."""
     if wind is None:
         return Air._make([0.0] * len(Air._fields))
     direction = wind["fan_direction"]
@@ -66,7 +66,7 @@ def air(wind: Mapping[str, Any] | None) -> Air[float]:
 
 
 def processes(wind: Mapping[str, Any] | None) -> tuple[list[float], list[float]]:
-    """exp(-GRID / T) and std sqrt(1 - exp(-2 GRID / T)) of the four processes: ambient x, y, z and turbulence."""
+    """Return exp(-GRID / T) and std sqrt(1 - exp(-2 GRID / T)) of the four processes: ambient x, y, z, turbulence."""
     if wind is None:
         return [0.0] * 4, [0.0] * 4
     ambient, gust = (math.exp(-GRID / wind[name]) for name in ("ambient_time", "turbulence_time"))
@@ -76,16 +76,16 @@ def processes(wind: Mapping[str, Any] | None) -> tuple[list[float], list[float]]
 
 
 def advance(keep: Number, kick: Number, state: Number, noise: Number) -> Number:
-    """An Ornstein-Uhlenbeck process one grid step later."""
+    """Advance an Ornstein-Uhlenbeck process by one grid step."""
     return keep * state + kick * noise
 
 
 def velocity(
     air: Air[Number], states: Vector4[Number], position: Vector3[Number], exp: Callable[[Number], Number]
 ) -> Vector3[Number]:
-    """Velocity of the air at `position`, given the states of the processes; world axes.
+    """Return the wind velocity at `position` for the states of the processes, in world axes.
 
-    `exp` is the exponential function for this kind of number.
+    `exp` is the exponential function for this type of number.
     """
     ambient_x, ambient_y, ambient_z, turbulence = states
     x, y, z = position[0] - air.place_x, position[1] - air.place_y, position[2] - air.place_z
@@ -111,12 +111,12 @@ class Wind:
         self._states: Vector4[float] = (0.0, 0.0, 0.0, 0.0)
 
     def next(self, position: Vector3[float]) -> Vector3[float]:
-        """Velocity of the air at `position` (m) from this grid point to the next (m/s), world axes."""
+        """Return the wind velocity (m/s, world axes) at `position` (m) from this grid point to the next."""
         velocity_now = velocity(self._air, self._states, position, math.exp)
         if not self._noise:
-            block = np.arange(self._read, self._read + BLOCK, dtype=np.uint64)
-            self._noise = uniform_noise(self._key, block).T[::-1].tolist()  # to be read from the end
-            self._read += BLOCK
+            block = np.arange(self._read, self._read + BLOCK_SIZE, dtype=np.uint64)
+            self._noise = uniform_noise(self._key, block).T[::-1].tolist()  # read from the end
+            self._read += BLOCK_SIZE
         x, y, z, turbulence = map(advance, self._keep, self._kick, self._states, self._noise.pop())
         self._states = x, y, z, turbulence
         return velocity_now

@@ -1,4 +1,4 @@
-"""Whether this machine can run everything: checks that tell what to do where something is wrong."""
+"""Checks of the installation, with suggested fixes."""
 
 from artde_gym.doctor.check_result import CheckResult
 from artde_gym.doctor.checks import CHECKS, Report, run_checks

@@ -1,4 +1,4 @@
-"""What a check finds."""
+"""Result of a check."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ Status = Literal["ok", "missing", "failed"]
 
 
 class CheckResult(NamedTuple):
-    """One line of a diagnosis.
+    """One line of a report.
 
     Attributes:
-        what: was looked at.
-        status: "missing" is something optional that is not there, or slow; "failed" is what nothing works without.
-        found: in a few words.
-        remedy: what to do, unless all is well.
+        what: subject of the check.
+        status: "missing": something optional is missing or slow; "failed": something required does not work.
+        found: short finding.
+        remedy: suggested fix, unless the status is "ok".
     """
 
     what: str

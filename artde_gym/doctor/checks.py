@@ -1,4 +1,4 @@
-"""All checks by name, each in a process of its own, so that nothing that one of them does ends the others."""
+"""Registry and execution of checks, each in its own process, so that a crash does not end the others."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from artde_gym.sim.factory import ENGINES
 
 
 class Check(NamedTuple):
-    """A check: `entry_point` is "module:function", called with `arguments` and giving a list of `CheckResult`s.
+    """A check: `entry_point` is "module:function", called with `arguments`, which returns a list of `CheckResult`s.
 
-    Without a title, it is the first line of the function's docstring.
+    Without a title, the first line of the function's docstring is used.
     """
 
     title: str
@@ -44,29 +44,29 @@ CHECKS: dict[str, Check] = {
     "pictures": Check("Pictures and videos", "artde_gym.doctor.pictures:pictures"),
     **{name: Check("", point) for name, point in pointed("artde_gym.checks").items()},
 }
-"""All checks by name: our own, then those of the entry points "artde_gym.checks", which no other process imports."""
+"""All checks by name: this module's, then entry points of "artde_gym.checks", imported only in the check's process."""
 
 PATIENCE = 180.0
-"""Seconds after which a check is given up."""
-REPORT_IT = "report it, with this line and the output of `artde-gym doctor --json`"
+"""Timeout of a check (s)."""
+REPORT_IT = "report this line with the output of `artde-gym doctor --json`"
 
 
 class Report(NamedTuple):
-    """What one check found, under its title."""
+    """Results of one check, with its title."""
 
     title: str
     outcomes: list[CheckResult]
 
 
 def run_checks(names: Sequence[str] | None = None, *, workers: int | None = None) -> Iterator[tuple[str, Report]]:
-    """Run some checks, or all; yields each report in the order of `CHECKS` as soon as it and those before it are done.
+    """Run some checks, or all, and yield their reports in order as they become available.
 
     Args:
-        names: of `CHECKS`.
-        workers: checks that run at once; None for one a core.
+        names: names in `CHECKS`; None for all.
+        workers: number of checks that run at once; None for one per core.
 
     Raises:
-        UnknownNameError: for a check that there is not.
+        UnknownNameError: for an unknown check.
     """
     chosen = list(CHECKS if names is None else names)
     for name in chosen:
@@ -79,7 +79,7 @@ def run_checks(names: Sequence[str] | None = None, *, workers: int | None = None
 
 
 def _isolated(name: str, check: Check) -> Report:
-    """What a check in a process of its own finds; its crash is a finding."""
+    """Run a check in its own process; a crash is reported as a finding."""
     context = multiprocessing.get_context("spawn")  # a fork would copy threads and locks
     ours, theirs = context.Pipe(duplex=False)
     process = context.Process(target=_run, args=(check, theirs))
@@ -90,7 +90,7 @@ def _isolated(name: str, check: Check) -> Report:
     if late:
         process.kill()
     else:
-        with contextlib.suppress(EOFError):  # it died without a word
+        with contextlib.suppress(EOFError):  # the process died without a report
             title, outcomes = ours.recv()
             found = Report(title or name, [CheckResult(*values) for values in outcomes])
     process.join()
@@ -98,14 +98,14 @@ def _isolated(name: str, check: Check) -> Report:
         return found
     said, remedy = f"the process died with exit code {process.exitcode}", REPORT_IT
     if late:
-        said, remedy = f"no answer in {PATIENCE:g} s", "end other programs and try again"
+        said, remedy = f"no answer in {PATIENCE:g} s", "close other programs and try again"
     title = check.title or name
     return Report(title, [CheckResult(title, "failed", said, remedy)])
 
 
 def _run(check: Check, channel: Any) -> None:
     sink = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(sink, 1)  # whatever libraries have to say
+    os.dup2(sink, 1)  # hide output of libraries
     os.dup2(sink, 2)
     outcomes = [tuple(outcome) for outcome in _attempted(check)]
     channel.send((check.title or _title_of(check), outcomes))
@@ -114,13 +114,13 @@ def _run(check: Check, channel: Any) -> None:
 
 def _title_of(check: Check) -> str:
     """Return the first line of a function's docstring; "" without one."""
-    with contextlib.suppress(Exception):  # what was wrong with it has been found
+    with contextlib.suppress(Exception):  # an import error has already been reported
         return (inspect.getdoc(resolved(check.entry_point)) or "").split("\n")[0].rstrip(".")
     return ""
 
 
 def _attempted(check: Check) -> list[CheckResult]:
-    """What a check finds, an exception being a finding."""
+    """Run a check; an exception is reported as a finding."""
     try:
         return resolved(check.entry_point)(*check.arguments)
     except Exception as error:

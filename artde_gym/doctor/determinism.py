@@ -1,4 +1,4 @@
-"""Whether the same seed gives the same bits."""
+"""Check of bitwise determinism."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from artde_gym.sim.factory import installed_engines
 
 STEPS = 150
 WALK, FLIGHT = "BipedWalk-Payload-v0", "QuadInfinity-Payload-v0"
-REMEDY = "see docs/determinism.md; results of this machine cannot be repeated to the bit"
+REMEDY = "see docs/determinism.md; results of this machine are not bitwise reproducible"
 
 
 def determinism() -> list[CheckResult]:
-    """The same closed loop twice here and once in another process, in every engine."""
+    """Run the same closed loop twice here and once in another process, in every engine."""
     names = runs()
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         there = pool.map_async(digest, names)
@@ -28,15 +28,15 @@ def determinism() -> list[CheckResult]:
     outcomes = []
     for name, (first, second), other in zip(names, here, elsewhere, strict=True):
         if first == second == other:
-            outcomes.append(CheckResult(name, "ok", "the same bits twice, and in another process"))
+            outcomes.append(CheckResult(name, "ok", "bitwise equal in two runs and in another process"))
         else:
-            where = "in one process" if first != second else "from one process to another"
+            where = "in one process" if first != second else "between processes"
             outcomes.append(CheckResult(name, "failed", f"results differ {where}", REMEDY))
     return outcomes
 
 
 def runs() -> list[str]:
-    """What is run."""
+    """Return the names of the runs."""
     return [
         *(f"{robot} in {engine}" for engine in installed_engines() for robot in ("biped", "quadrotor")),
         "quadrotors in batch",
@@ -44,7 +44,7 @@ def runs() -> list[str]:
 
 
 def digest(name: str) -> str:
-    """Hash of all observations of a seeded closed loop."""
+    """Return a hash of all observations of a seeded closed loop."""
     robot, engine = name.split(" in ")
     env: Any
     if engine == "batch":

@@ -1,4 +1,4 @@
-"""Every environment against the checkers of Gymnasium and Stable-Baselines3."""
+"""Checks of every environment with the checkers of Gymnasium and Stable-Baselines3."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from artde_gym.sim.factory import ENGINES, resolve_engine
 
 DURATION, PAYLOAD = 3.0, {"payload": 0.3}  # s, kg
 IN_SI_UNITS = r".*(symmetric and normalized|recommend using np.float32)"
-"""Warnings that are no findings: actions are in Nm and N, and float64, by design; RescaleAction gives [-1, 1]."""
-REMEDY = "pip install -c constraints.txt --force-reinstall . : the tests pass with these versions"
+"""Warnings to ignore: actions are in Nm and N, and float64, by design; RescaleAction gives [-1, 1]."""
+REMEDY = "install the tested versions: pip install -c constraints.txt --force-reinstall ."
 
 
 def in_engine(name: str) -> list[CheckResult]:
-    """Run Gymnasium's checker on every environment in an engine, where it is there.
+    """Run Gymnasium's checker on every environment in an engine, if it is available.
 
-    Environments that know no engine are checked with the default one's.
+    Environments without the argument `engine` are checked together with the default engine.
     """
     default = resolve_engine(None)
     if missing := ENGINES[name].missing():
@@ -38,7 +38,7 @@ def in_engine(name: str) -> list[CheckResult]:
 
 
 def stable_baselines3() -> list[CheckResult]:
-    """Stable-Baselines3's checker on every environment."""
+    """Run Stable-Baselines3's checker on every environment."""
     if importlib.util.find_spec("stable_baselines3") is None:
         return [CheckResult("Stable-Baselines3", "missing", "not installed", "pip install 'artde-gym[rl]'")]
     checker = importlib.import_module("stable_baselines3.common.env_checker")
@@ -46,7 +46,7 @@ def stable_baselines3() -> list[CheckResult]:
 
 
 def batch() -> list[CheckResult]:
-    """Vectors of environments: shapes, bounds, and that a vector of one equals a part of a vector of many."""
+    """Check vector environments: shapes, bounds, and bitwise independence of the number of environments."""
     outcomes = []
     for name in ours():
         if gym.spec(name).vector_entry_point is None:
@@ -68,11 +68,11 @@ def batch() -> list[CheckResult]:
 
 
 def _gymnasium(env: Any) -> None:
-    check_env(env, skip_render_check=True)  # pictures have a check of their own
+    check_env(env, skip_render_check=True)  # rendering has its own check
 
 
 def _arguments(name: str, engine: str | None = None) -> dict[str, Any]:
-    """Arguments for a short episode with a payload, as far as the environment takes them."""
+    """Return the arguments of a short episode with a payload that the environment takes."""
     wanted: dict[str, Any] = {"duration": DURATION, "engine": engine} if engine else {"duration": DURATION}
     if DISTURBANCES["payload"].honored_by(robot_of(name)):
         wanted["disturbances"] = PAYLOAD
@@ -90,5 +90,5 @@ def _checked(name: str, engine: str, checker: Callable[[Any], None]) -> CheckRes
     except Exception as error:
         return CheckResult(name, "failed", f"{type(error).__name__}: {error}", REMEDY)
     if caught:
-        return CheckResult(name, "ok", f"check_env passes, and says: {caught[0].message}")
+        return CheckResult(name, "ok", f"check_env passes with a warning: {caught[0].message}")
     return CheckResult(name, "ok", "check_env passes")

@@ -1,4 +1,4 @@
-"""Python, packages and files."""
+"""Checks of Python, packages and files."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from artde_gym.sim.factory import missing_bullet
 
 PACKAGE = "artde-gym"
 MODULES = {"mujoco": "mujoco", "numpy": "numpy", "scipy": "scipy", "matplotlib": "matplotlib", "pandas": "pandas"}
-"""Packages with compiled parts -> what is imported to see that they load."""
-DISK = 1e9  # bytes, of which a results folder seldom needs more
+"""Packages with compiled parts -> modules whose import proves that they load."""
+FREE_DISK_BYTES = 1e9  # bytes, enough for most results folders
 RUNS = Path("runs")
 
 
 def python() -> list[CheckResult]:
-    """The interpreter, and what the package cannot do without."""
+    """Check the interpreter and the required packages."""
     try:
         wanted = str(metadata.metadata(PACKAGE)["Requires-Python"])
     except metadata.PackageNotFoundError:
         return [
             CheckResult(
-                PACKAGE, "failed", "on the path, but not installed", "pip install -c constraints.txt -e . in its folder"
+                PACKAGE, "failed", "importable, but not installed", "pip install -c constraints.txt -e . in its folder"
             )
         ]
     version = platform.python_version()
@@ -50,14 +50,14 @@ def python() -> list[CheckResult]:
 
 
 def _engine() -> CheckResult:
-    """The default physics engine, and why it is this one."""
+    """Report the default physics engine and the reason for it."""
     if missing := missing_bullet():
-        return CheckResult("default engine", "missing", "MuJoCo, since PyBullet cannot be imported", missing)
-    return CheckResult("default engine", "ok", "PyBullet, since it can be imported")
+        return CheckResult("default engine", "missing", "MuJoCo, because PyBullet cannot be imported", missing)
+    return CheckResult("default engine", "ok", "PyBullet, because it can be imported")
 
 
 def extras() -> list[CheckResult]:
-    """Every extra with the versions of its packages."""
+    """Check every extra and report the versions of its packages."""
     outcomes = []
     for extra in metadata.metadata(PACKAGE).get_all("Provides-Extra") or ():
         remedy = f"pip install '{PACKAGE}[{extra}]'"
@@ -69,7 +69,7 @@ def extras() -> list[CheckResult]:
 
 
 def files() -> list[CheckResult]:
-    """Whether results can be written where they go by default, and whether there is room."""
+    """Check that the default results folder is writable and has enough space."""
     folder = RUNS.absolute()
     place = next(parent for parent in (folder, *folder.parents) if parent.exists())
     try:
@@ -78,18 +78,21 @@ def files() -> list[CheckResult]:
             file.flush()
             os.fsync(file.fileno())
     except OSError as error:
-        remedy = "go to a folder that you may write in, or name one with --out"
+        remedy = "change to a writable folder, or name one with --out"
         return [CheckResult("results folder", "failed", f"{place}: {error.strerror}", remedy)]
     free = shutil.disk_usage(place).free
     room = f"{free / 1e9:.1f} GB free"
-    outcomes = [CheckResult("results folder", "ok", f"{RUNS}/ can be written")]
-    if free < DISK:
-        return [*outcomes, CheckResult("disk", "missing", room, "make room, or name a folder elsewhere with --out")]
+    outcomes = [CheckResult("results folder", "ok", f"{RUNS}/ is writable")]
+    if free < FREE_DISK_BYTES:
+        return [
+            *outcomes,
+            CheckResult("disk", "missing", room, "free some space, or name a folder elsewhere with --out"),
+        ]
     return [*outcomes, CheckResult("disk", "ok", room)]
 
 
 def _requirements(extra: str | None) -> list[Requirement]:
-    """Of the package itself, or of one extra alone."""
+    """Return the requirements of the package itself, or only of one extra."""
     found = []
     for text in metadata.requires(PACKAGE) or ():
         requirement = Requirement(text)

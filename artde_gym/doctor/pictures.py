@@ -1,4 +1,4 @@
-"""Displays, OpenGL, ffmpeg and Chromium: nothing that results need."""
+"""Checks of rendering, display, ffmpeg and Chromium, which results do not need."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
 def pictures() -> list[CheckResult]:
-    """Each of them by itself."""
+    """Check rendering, display, ffmpeg and Chromium."""
     drawn = [_picture(name, engine.title) for name, engine in ENGINES.items()]
     return [*drawn, _display(), _ffmpeg(), _browser()]
 
 
 def _picture(engine: str, written: str) -> CheckResult:
-    """A picture without a display."""
+    """Check rendering without a display."""
     what = f"pictures in {written}"
     try:
         env: Any = gym.make("QuadInfinity-Payload-v0", disable_env_checker=True, duration=3.0, engine=engine,
@@ -45,8 +45,8 @@ def _picture(engine: str, written: str) -> CheckResult:
 
 
 def _display() -> CheckResult:
-    """An X server that answers: a window of Bullet's ends the interpreter where none does."""
-    remedy = "nothing but live windows need one: work at a desktop, or with `ssh -X`; pictures and videos need none"
+    """Check for a responding X server: without one, opening Bullet's window ends the interpreter."""
+    remedy = "only live windows need a display: work at a desktop or with `ssh -X`; pictures and videos work without"
     if sys.platform != "linux":
         return CheckResult("display", "ok", "the window system's")
     name = os.environ.get("DISPLAY")
@@ -65,7 +65,7 @@ def _display() -> CheckResult:
 
 
 def _ffmpeg() -> CheckResult:
-    """The system's, or the one that MoviePy brings."""
+    """Check for ffmpeg: the system's, or the one that comes with MoviePy."""
     path = shutil.which("ffmpeg")
     if path is None and importlib.util.find_spec("imageio_ffmpeg") is not None:
         try:
@@ -81,7 +81,7 @@ def _ffmpeg() -> CheckResult:
 
 
 def _browser() -> CheckResult:
-    """For the tests of reports alone; any browser opens one."""
+    """Check for Chromium, which only the tests of reports need."""
     path = next(filter(None, map(shutil.which, BROWSERS)), None)
     if path is None:
         return CheckResult("Chromium", "missing", "not found: tests of reports are skipped", "apt install chromium")

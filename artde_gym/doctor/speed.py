@@ -1,4 +1,4 @@
-"""Whether the machine is fast enough, and our part of the time small."""
+"""Check of the machine's speed and of the environments' overhead."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from artde_gym.benchmark.walk import LEAST, BareWalk
 from artde_gym.doctor.check_result import CheckResult
 
 ROUNDS = 10
-SHARE = 0.75
-"""Of a rate that the benchmark wants: a look of a second is not exact."""
-REAL_TIME = 1000  # steps of 1 ms a second
+PASSING_SHARE = 0.75
+"""Share of the benchmark's required rate that passes: a measurement of one second is inexact."""
+REAL_TIME_RATE = 1000  # steps of 1 ms per second
 
 
 def speed() -> list[CheckResult]:
-    """Steps a second of the biped, alone and against the bare engine."""
+    """Measure steps per second of the biped, and its ratio to the bare engine."""
     load = f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""  # not on Windows
     outcomes = [CheckResult("processors", "ok", f"{os.cpu_count()}{load}")]
     for engine, written in ENGINES.items():
@@ -25,12 +25,12 @@ def speed() -> list[CheckResult]:
                     "bare": BareWalk(loop, engine).turn}  # fmt: skip
         times = in_turns(variants, ROUNDS)
         rate, ratio = TURN / times["loop"], times["bare"] / times["alone"]
-        found = f"{rate:.0f} steps a second under ARTDE, {rate / REAL_TIME:.1f} x real time"
-        slow = "end other programs; check that this is no emulated or throttled processor"
-        outcomes.append(_judged(written, found, rate > REAL_TIME, slow))
-        wanted = SHARE * LEAST.get((engine, "environment"), 0.0)
+        found = f"{rate:.0f} steps per second under ARTDE, {rate / REAL_TIME_RATE:.1f} x real time"
+        slow = "close other programs; check that the processor is not emulated or throttled"
+        outcomes.append(_judged(written, found, rate > REAL_TIME_RATE, slow))
+        wanted = PASSING_SHARE * LEAST.get((engine, "environment"), 0.0)
         found = f"env.step at {ratio:.2f} of the bare engine's rate"
-        heavy = f"expected {wanted:.2f} or more: set OMP_NUM_THREADS=1, end other programs, see `artde-gym benchmark`"
+        heavy = f"expected {wanted:.2f} or more: set OMP_NUM_THREADS=1, close other programs, see `artde-gym benchmark`"
         outcomes.append(_judged(written, found, ratio > wanted, heavy))
     return outcomes
 

@@ -1,4 +1,4 @@
-"""Ojas walks along a given pattern under joint torques: what all its tasks share."""
+"""Base class of the walking tasks of Ojas: joint torques follow a given walking pattern."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ from artde_gym.sim.engine import Camera, Engine
 from artde_gym.sim.factory import EngineName, make_engine, resolve_engine
 from artde_gym.sim.rotation import arcsine, roll_pitch
 
-CAMERA_HEIGHT = 0.42  # m, of what it looks at
-LEEWAY = 0.15  # m, that the robot may be off its pattern before the camera goes with it
+CAMERA_HEIGHT = 0.42  # m, of the camera's target
+CAMERA_SLACK = 0.15  # m, distance from the pattern beyond which the camera follows the robot
 
 _PAGE = (
     task.DOCUMENTATION
@@ -40,37 +40,37 @@ _PAGE = (
 | `engine` | None | "bullet", "mujoco", None | physics engine; None: Bullet where it can be imported, else MuJoCo |
 | `width`, `height` | 640, 480 | 16 to 4096 | pixels of a picture |
 
-With `render_mode="rgb_array"`, `render` draws 30 pictures a simulated second; asked more often, it gives the last one
-again. Words of your own in `env.unwrapped.view.caption` are written into each of them.
+With `render_mode="rgb_array"`, `render` draws 30 frames per simulated second and returns the last one again in between.
+Set `env.unwrapped.view.caption` to add text to each frame.
 
-Gymnasium's `RecordVideo` takes a picture a step and plays `metadata["render_fps"]` of them a second: up to 100 steps a
-second in real time, and more of them, at shorter control periods, in slow motion. `artde-gym video` is in real time.
+Gymnasium's `RecordVideo` records one frame per step and plays `metadata["render_fps"]` of them per second: real time
+up to 100 steps per second, slow motion at shorter control periods. `artde-gym video` is always in real time.
 
-`reset(options={{"disturbances": ..., "scenario": "S2"}})` replaces the disturbances of this and the following
-episodes, by a mapping or by those of a named scenario; nothing is merged: what a mapping leaves out does not happen.
+`reset(options={{"disturbances": ..., "scenario": "S2"}})` overrides the disturbances of this and the following
+episodes with a mapping or a named scenario's; nothing is merged: a mapping has to list every disturbance.
 
 ## Info
-The same keys after `reset` and after `step`, numbers and arrays alone (`artde_gym.info`): `time_s`; the terms of the
-reward, `reward_alive` and so on; `foot_loads` (normal force on each foot, N); what was sampled,
-`disturbance.payload.mass` and so on, and the same in the grammar in `env.unwrapped.sampled_disturbances`; how many
-pushes and payloads began and ended in this control period, `push_begins`, `push_ends`, `payload_attached`,
-`payload_dropped`; why it fell, `fell_tilt`, `fell_height`, `fell_speed` (true or false)."""
+Only numbers and arrays, with the same keys after `reset` and `step` (`artde_gym.info`): `time_s`; the terms of the
+reward (`reward_alive`, ...); `foot_loads` (normal force on each foot, N); the sampled disturbances
+(`disturbance.payload.mass`, ...; `env.unwrapped.sampled_disturbances` has them in the grammar); the number of pushes
+and payloads that began and ended in this control period (`push_begins`, `push_ends`, `payload_attached`,
+`payload_dropped`); the reason for a fall (`fell_tilt`, `fell_height`, `fell_speed`, true or false)."""
 )
 
 
 class BipedEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any]]):
-    """What all tasks of Ojas share; a subclass says what disturbs the walk by default.
+    """Base class of all tasks of Ojas; a subclass sets the default disturbances.
 
     Args:
-        disturbances: in place of the task's own; see `artde_gym.disturbances`.
+        disturbances: override of the task's disturbances; see `artde_gym.disturbances`.
         control_period: time between two actions (s), a whole multiple of the physics' 0.001 s.
         actuator_inertia: see `artde_gym.robots.ojas.model`.
         arms: see `artde_gym.robots.ojas.model`.
-        self_collision: whether the feet stop each other; a walk as planned never lets them touch.
+        self_collision: whether the feet can collide; they never touch in the planned walk.
         speed: see `artde_gym.robots.ojas.walking`, also for `step_duration` and `duration`.
         observe_ground_force: whether the observation ends with the ground's force on each foot.
-        engine: physics engine; None for the default. `engine_name` says which one it is.
-        width, height: of pictures (pixels).
+        engine: physics engine; None for the default. `engine_name` is the selected one.
+        width, height: size of a frame (pixels).
         render_mode: "rgb_array" or None.
 
     Raises:
@@ -117,7 +117,7 @@ class BipedEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any]]):
             self.engine_name, walk.robot, task.TIME_STEP, renders=render_mode is not None
         )
         camera = Camera((0.0, 0.0, CAMERA_HEIGHT), width=width, height=height)
-        self.view = View(self._engine, camera, self.control_period, share=1.0, slack=LEEWAY)
+        self.view = View(self._engine, camera, self.control_period, share=1.0, slack=CAMERA_SLACK)
         self.metadata = {**self.metadata, **self.view.metadata}
         self.observe_ground_force = observe_ground_force
         self.observation_layout = task.observation_layout(observe_ground_force)
@@ -137,10 +137,10 @@ class BipedEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any]]):
         self._effects = Effects(1, self.words)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
-        """Start a walk; `options` are those of the class' documentation.
+        """Start a walk; the class' documentation lists the `options`.
 
         Raises:
-            OptionError: for an unknown option, or a scenario that needs another environment.
+            OptionError: for an unknown option, or a scenario of another environment.
             DisturbanceError: for a malformed disturbance.
         """
         self._require_open()
@@ -180,7 +180,7 @@ class BipedEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any]]):
         return observation, reward, fell, truncated, self._info(terms, falls, events)
 
     def render(self) -> NDArray[np.uint8] | None:
-        """A picture from a camera that walks along; None without a render mode."""
+        """Draw a frame from a camera that follows the robot; return None without a render mode."""
         self._require_open()
         if self.render_mode is None:
             return None
@@ -195,7 +195,7 @@ class BipedEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any]]):
 
     @property
     def pattern(self) -> WalkingPattern:
-        """What is walked."""
+        """The walking pattern."""
         return self._walk.pattern
 
     @property
@@ -207,7 +207,7 @@ class BipedEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any]]):
         return self._active.schedule
 
     def _begin(self, sampled: Mapping[str, Any]) -> Array:
-        """Set an episode up and let the robot come to rest in it; returns the joint torques in the end."""
+        """Set up an episode and let the robot settle; return the final joint torques."""
         self._engine.restore_state(self._settled)
         self._walk.set_up(self._engine, sampled)
         self._active = EpisodeDisturbances(sampled, self._walk, self.np_random)
@@ -224,7 +224,7 @@ class BipedEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any]]):
         return tau
 
     def _settle(self, pose: Array, steps: int) -> Array:
-        """Stand still for so many time steps; returns the torques in the end."""
+        """Stand still for `steps` time steps; return the final torques."""
         tau = self._walk.stand
         for _ in range(steps):
             state = self._engine.state()
@@ -233,7 +233,7 @@ class BipedEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any]]):
         return np.clip(tau, -robot.TORQUE_LIMIT, robot.TORQUE_LIMIT)
 
     def _simulate(self, command: Array) -> list[str]:
-        """Let `command` act for one control period, with what disturbs it; returns what began or ended meanwhile."""
+        """Apply `command` and the disturbances for one control period; return the events."""
         engine, active = self._engine, self._active
         events: list[str] = []
         first, affected = self.elapsed, self._effects.acting[0]
@@ -250,13 +250,13 @@ class BipedEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any]]):
         return events
 
     def _info(self, terms: dict[str, float], falls: Sequence[bool], events: Sequence[str]) -> dict[str, Any]:
-        """Tell what policies are not meant to see."""
+        """Return the `info`: data that policies must not use."""
         info = self._told.told(self._k * self.control_period, terms, events, falls)
         info["foot_loads"] = np.array(self._loads)
         return info
 
     def _measure(self) -> Array:
-        """Read the engine; returns the observation."""
+        """Read the engine and return the observation."""
         state = self._state = self._engine.state()
         loads = self._loads = self._engine.foot_loads()
         self._tilt = roll_pitch(state.quat_xyzw, math.atan2, arcsine)
@@ -284,5 +284,5 @@ class BipedEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any]]):
 
 
 def document(default: str) -> Callable[[type[BipedEnv]], type[BipedEnv]]:
-    """Class decorator: fill the sections that all tasks share into a docstring, at `{shared}`."""
+    """Return a class decorator that inserts the sections shared by all tasks at `{shared}` in a docstring."""
     return filled(shared=_PAGE.format(observation=task.OBSERVATION.table(), default=default))

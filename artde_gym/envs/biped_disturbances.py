@@ -1,4 +1,4 @@
-"""What disturbs one walk, from its beginning to its end."""
+"""Disturbances of one walking episode."""
 
 from __future__ import annotations
 
@@ -16,16 +16,18 @@ from artde_gym.sim.engine import World
 
 
 class EpisodeDisturbances:
-    """The disturbances of one episode: `start`, `begin_walk`, then `begin_period` and the steps of each control period.
+    """The disturbances of one episode.
+
+    Call `start`, `begin_walk`, then `begin_period` and `apply` at each step of every control period.
 
     Args:
-        sampled: drawn disturbances.
-        walk: that they disturb.
-        rng: of the environment.
+        sampled: sampled disturbances.
+        walk: the disturbed walk.
+        rng: generator of the environment.
 
     Attributes:
-        schedule: of pushes and the payload.
-        sensing: of observations; None without any.
+        schedule: schedule of pushes and the payload.
+        sensing: disturbances of the observations; None without any.
     """
 
     def __init__(self, sampled: Mapping[str, Any], walk: Walk, rng: np.random.Generator) -> None:
@@ -40,25 +42,25 @@ class EpisodeDisturbances:
         self._substeps = walk.substeps
 
     def start(self, world: World) -> None:
-        """Bring about what is there while the robot settles."""
+        """Apply the disturbances that act while the robot settles."""
         self.schedule.start(world)
 
     def begin_walk(self, tau: Array) -> None:
-        """The walk begins, with torques `tau` (n,) (Nm)."""
+        """Begin the walk with torques `tau` (n,) (Nm)."""
         if self._actuation is not None:
             self._actuation.start(tau)
 
     def next_event_step(self, step: int) -> int:
-        """The first time step from `step` on in which commanded torques are not all that happens."""
+        """Return the first time step from `step` on in which anything but the commanded torques acts."""
         return step if self._actuation is not None else self.schedule.next(step)
 
     def begin_period(self, command: Array) -> None:
-        """A control period begins with torques `command` (n,) (Nm) within their bounds."""
+        """Begin a control period with torques `command` (n,) (Nm) within their bounds."""
         self._target = command if self._actuation is None else self._actuation.target(command)
         self._total = 0.0
 
     def apply(self, step: int, world: World, events: list[str]) -> Array:
-        """Disturb a world for a time step; returns the torques (n,) (Nm) that act, and adds to `events`."""
+        """Disturb a world for a time step; return the torques (n,) (Nm) that act and append to `events`."""
         events += self.schedule.apply(step, world)
         if self._actuation is None:
             return self._target
@@ -67,5 +69,5 @@ class EpisodeDisturbances:
         return applied
 
     def applied(self) -> Array:
-        """Mean torques (n,) (Nm) of the control period: they belong to its mean acceleration."""
+        """Return the mean torques (n,) (Nm) of the control period, which match its mean acceleration."""
         return self._target if self._actuation is None else np.asarray(self._total / self._substeps)

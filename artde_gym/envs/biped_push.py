@@ -19,9 +19,9 @@ class BipedPushEnv(BipedEnv):
     ## Description
     Scenario S3 of Dantu, *Adaptive Artificial Time Delay Control for Robotic Systems* (2023): a payload of 1.3 kg, 10 N
     on the chest, forward, and 10 N on the left upper arm at 45 degrees to the vertical, inward and down. The thesis
-    calls the pushes impulsive and gives no duration; 0.2 s here. With `arms="fixed"` the arm is one body with the
-    torso, and the push acts at the arm's own place on it; with `arms="revolute"` it acts on the arm's link.
-    `disturbances` replaces payload and pushes together.
+    calls the pushes impulsive without a duration; here it is 0.2 s. With `arms="fixed"` the arm is one body with the
+    torso, and the push acts at the arm's position on it; with `arms="revolute"` it acts on the arm's link.
+    `disturbances` overrides payload and pushes together.
 
     {shared}
 
@@ -34,7 +34,7 @@ class BipedPushEnv(BipedEnv):
 
 @biped_vector.document(_DEFAULT)
 class BipedPushVectorEnv(biped_vector.BipedVectorEnv):
-    """Many robots walk with a payload and are pushed twice, as the one of `BipedPushEnv`.
+    """Many robots walk with a payload and are pushed twice, as in `BipedPushEnv`.
 
     {shared}
 

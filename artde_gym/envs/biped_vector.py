@@ -1,4 +1,4 @@
-"""Ojas walks, many robots at once in MuJoCo: what all its tasks share."""
+"""Base class of the walking tasks of Ojas, with many robots at once in MuJoCo."""
 
 from __future__ import annotations
 
@@ -33,25 +33,25 @@ _PAGE = (
     task.DOCUMENTATION
     + """
 | `num_envs` | 1 | from 1 | number of robots |
-| `engine` | None | None, "mujoco" | physics engine; Bullet has no batches, and None warns of it |
-| `threads` | 1 | from 1 | that step the robots; no result depends on it |
+| `engine` | None | None, "mujoco" | physics engine; None warns if `gym.make` would use another one |
+| `threads` | 1 | from 1 | number of threads that step the robots; results do not depend on it |
 | `autoreset_mode` | "NextStep" | "NextStep", "SameStep", "Disabled" | Gymnasium's `AutoresetMode` |
-| `max_episode_steps` | None | from 1 | after which a walk is truncated, if its duration is longer |
-| `render_mode` | None | None | `vectorization_mode="sync"` draws pictures |
+| `max_episode_steps` | None | from 1 | steps after which a walk is truncated, if its duration is longer |
+| `render_mode` | None | None | use `vectorization_mode="sync"` to render |
 
-`reset(options={{"disturbances": ..., "scenario": "S2"}})` replaces the disturbances of this and the following
-episodes, by a mapping or by those of a named scenario; nothing is merged: what a mapping leaves out does not happen.
-The option `"reset_mask"` (n,) says where to reset.
+`reset(options={{"disturbances": ..., "scenario": "S2"}})` overrides the disturbances of this and the following
+episodes with a mapping or a named scenario's; nothing is merged: a mapping has to list every disturbance.
+The option `"reset_mask"` (n,) selects the robots to reset.
 
-## Many at once
-This is for `gym.make_vec(..., vectorization_mode="vector_entry_point")`: each robot does the same to the bit as the one
-of `gym.make(..., engine="mujoco")` with the same seed and the same actions, whatever the number of robots and of
-threads. Each has a generator of its own. A walk that is over begins anew with the next step, which ignores its action;
-with `autoreset_mode="SameStep"` it begins anew at once, and `info["final_obs"]` and `info["final_info"]` tell how it
-ended; with `"Disabled"` it waits, unmoved, until a reset whose mask it is in.
+## Vectorization
+For `gym.make_vec(..., vectorization_mode="vector_entry_point")`. Each robot has its own random generator and behaves
+bitwise as in `gym.make(..., engine="mujoco")` with the same seed and actions, for any number of robots and threads.
+A finished walk restarts with the next step, which ignores its action; with `autoreset_mode="SameStep"` it restarts in
+the same step, with its last observation and info in `info["final_obs"]` and `info["final_info"]`; with `"Disabled"` it
+stays as it is until a reset whose mask includes it.
 
 ## Info
-That of the single environment, each entry `x` with a mask `_x` (n,), in nested dictionaries too: numbers and booleans
+As in the single environment, each entry `x` with a mask `_x` (n,), in nested dictionaries too: numbers and Booleans
 (n,), arrays (n, ...). `env.unwrapped.sampled_disturbances` is a list."""
 )
 
@@ -64,14 +64,14 @@ _ARCTANGENT, _ARCSINE, _EXP = vectorize(math.atan2), vectorize(arcsine), vectori
 
 
 class BipedVectorEnv(BaseVectorEnv):
-    """What all tasks of many robots share; a subclass says what disturbs the walk by default.
+    """Base class of all tasks of Ojas with many robots; a subclass sets the default disturbances.
 
     Args:
         num_envs: number of robots.
-        engine: "mujoco"; None as well, with a warning that it is not the one of `gym.make`.
-        threads: that step the robots.
+        engine: "mujoco" or None; None warns if `gym.make` would use another one.
+        threads: number of threads that step the robots.
         render_mode, autoreset_mode, max_episode_steps: see `artde_gym.envs.vector.BaseVectorEnv`.
-        disturbances: as all further arguments, see `artde_gym.envs.biped.BipedEnv`.
+        disturbances: see `artde_gym.envs.biped.BipedEnv`, also for all further arguments.
 
     Raises:
         OptionError: for an argument out of range.
@@ -127,12 +127,12 @@ class BipedVectorEnv(BaseVectorEnv):
         warn_of_idle(self._disturbances, self._last * self.control_period)
         self._batch = make_batch("mujoco", walk.robot, num_envs, task.TIME_STEP, threads)
         self._active: dict[int, EpisodeDisturbances] = {}
-        self._next_event = np.full(num_envs, NEVER)  # time step of each walk in which its course is to be asked again
+        self._next_event = np.full(num_envs, NEVER)  # time step of each walk's next disturbance event
         self._pulses: GrfPulses | None = None
         self._pulsed = np.zeros(num_envs, np.bool_)  # robots with ground reaction pulses
         self._effects = Effects(num_envs, self.words)
-        self._sensing: dict[int, Sensing] = {}  # where sensors err
-        self._readings: dict[int, Array] = {}  # what they measured last
+        self._sensing: dict[int, Sensing] = {}  # robots with sensor errors
+        self._readings: dict[int, Array] = {}  # their last measurements
         self._tau = self._previous = np.zeros((num_envs, task.N_JOINTS))
         self._high = np.full((num_envs, task.N_JOINTS), robot.TORQUE_LIMIT)
         self._low = -self._high
@@ -179,7 +179,7 @@ class BipedVectorEnv(BaseVectorEnv):
         self._pulsed[i] = entry is not None
 
     def _settle(self, some: NDArray[np.int32], poses: Array, steps: int) -> Array:
-        """Let some robots stand still in `poses` (n, 12) (rad) for so many time steps; returns their last torques."""
+        """Let some robots stand still in `poses` (n, 12) (rad) for `steps` time steps; return their last torques."""
         tau = np.zeros_like(poses)
         for _ in range(steps):
             tau = self._walk.hold(poses, *self._batch.joints(some))
@@ -201,9 +201,9 @@ class BipedVectorEnv(BaseVectorEnv):
         return self._disturbed(commands, awake, goes_on if steps == 1 else busy)
 
     def _disturbed(self, commands: Array, awake: Mask, some: Mask) -> dict[int, list[str]]:
-        """Advance `some` robots by a control period in which something happens to those that are `awake`.
+        """Advance `some` robots by a control period in which disturbances act on those in `awake`.
 
-        What acts on these takes the place of what was commanded. Returns events.
+        The torques that act on these replace the commanded ones. Return the events.
         """
         steps, torques = self._walk.substeps, commands.copy()
         happening = [(i, self._active[i], int(self._k[i]) * steps) for i in np.flatnonzero(awake).tolist()]
@@ -223,7 +223,7 @@ class BipedVectorEnv(BaseVectorEnv):
         return {i: words for i, words in events.items() if words}
 
     def _affected(self, torques: Array, some: Mask, step: int) -> Array:
-        """Load the bases of `some` robots by their effects; returns torques with those of the effects added."""
+        """Apply the effects to the bases of `some` robots; return the torques with those of the effects added."""
         acting = some & self._effects.acting
         if not acting.any():
             return torques
@@ -236,7 +236,7 @@ class BipedVectorEnv(BaseVectorEnv):
         return torques
 
     def _states(self, steps: NDArray[np.int64]) -> RobotStates:
-        """The states of all robots, after so many time steps (n,) of each."""
+        """Return the states of all robots after `steps` (n,) time steps."""
         with np.errstate(invalid="ignore", over="ignore"):  # of a robot that has diverged
             state = self._batch.state()
         of_base = (state.position, state.quat_xyzw, state.velocity, state.angular_velocity)
@@ -244,7 +244,7 @@ class BipedVectorEnv(BaseVectorEnv):
         return RobotStates(steps * task.TIME_STEP, state.q, state.qd, *base)
 
     def _step(self, torques: Array, some: Mask, steps: int) -> None:
-        """Advance some robots by so many time steps under their rows of `torques`."""
+        """Advance some robots by `steps` time steps under their rows of `torques`."""
         if some.all():
             self._batch.step(torques, steps=steps)
         else:
@@ -276,7 +276,7 @@ class BipedVectorEnv(BaseVectorEnv):
 
     def _score(self, truth: Array) -> tuple[dict[str, Array], Sequence[Mask]]:
         state, tau, (roll, pitch) = self._state, self._tau, self._tilt
-        with np.errstate(invalid="ignore", over="ignore"):  # likewise
+        with np.errstate(invalid="ignore", over="ignore"):  # of a robot that has diverged
             error = truth[:, COLUMNS["q_ref"]] - state.q
             change = tau - self._previous
             squares = _square(error), roll * roll + pitch * pitch, _square(tau), _square(change)
@@ -288,10 +288,10 @@ class BipedVectorEnv(BaseVectorEnv):
 
 
 def _square(vectors: Array) -> Array:
-    """Squared norms of vectors (n, size), each summed as that of a single one is."""
+    """Return squared norms of vectors (n, size), summed in the same order as for a single vector."""
     return np.vecdot(vectors, vectors)
 
 
 def document(default: str) -> Callable[[type[BipedVectorEnv]], type[BipedVectorEnv]]:
-    """Class decorator: fill the sections that all tasks share into a docstring, at `{shared}`."""
+    """Return a class decorator that inserts the sections shared by all tasks at `{shared}` in a docstring."""
     return filled(shared=_PAGE.format(observation=task.OBSERVATION.table(), default=default))

@@ -16,9 +16,9 @@ class BipedWalkPayloadEnv(BipedEnv):
     """Ojas, a 20-joint humanoid of 8.986 kg and 0.94 m, walks with a payload on its torso.
 
     ## Description
-    A walking pattern (stand 2 s, walk, stop) gives a reference for the twelve leg joints; the policy gives their
-    torques. What the policy does not see: payload, pushes, friction. After section 2.5 of Dantu, *Adaptive Artificial
-    Time Delay Control for Robotic Systems* (2023); the robot's mass distribution and the pattern are ours.
+    A walking pattern (stand 2 s, walk, stop) is the reference of the twelve leg joints; the policy commands their
+    torques. The policy does not observe payload, pushes and friction. After section 2.5 of Dantu, *Adaptive Artificial
+    Time Delay Control for Robotic Systems* (2023); the robot's mass distribution and the pattern are this project's.
 
     {shared}
 
@@ -31,7 +31,7 @@ class BipedWalkPayloadEnv(BipedEnv):
 
 @biped_vector.document(_DEFAULT)
 class BipedWalkPayloadVectorEnv(biped_vector.BipedVectorEnv):
-    """Many robots walk with a payload, as the one of `BipedWalkPayloadEnv`.
+    """Many robots walk with a payload, as in `BipedWalkPayloadEnv`.
 
     {shared}
 

@@ -1,4 +1,4 @@
-"""What is left of an environment that was closed."""
+"""Errors for environments that are used after `close`."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ CLOSED_MESSAGE = "the environment is closed: make a new one"
 
 
 class _ClosedEngine:
-    """In place of an engine (`artde_gym.sim.engine.Engine`): whatever it is asked, the answer is an error."""
+    """A replacement of an engine (`artde_gym.sim.engine.Engine`) that raises an error on every access."""
 
     def close(self) -> None:
-        """Closed it is."""
+        """Do nothing: already closed."""
 
     def __getattr__(self, name: str) -> NoReturn:
         if name.startswith("__"):
-            raise AttributeError(name)  # as Python asks when it copies
+            raise AttributeError(name)  # special methods, which Python looks up to copy an object
         raise gym.error.ClosedEnvironmentError(CLOSED_MESSAGE)
 
     def __reduce__(self) -> str:
-        return "CLOSED"  # of which there is one, also in a copy
+        return "CLOSED"  # a copy is the same object
 
 
 def require_open(*, closed: bool) -> None:
-    """Refuse to go on.
+    """Check that an environment is open.
 
     Raises:
         gymnasium.error.ClosedEnvironmentError: if the environment is closed.

@@ -10,7 +10,7 @@ Class = TypeVar("Class", bound=type)
 
 
 def filled(**sections: str) -> Callable[[Class], Class]:
-    """Class decorator: put sections in the place of their names in braces in the docstring."""
+    """Return a class decorator that replaces names in braces in the docstring with sections."""
 
     def fill(documented: Class) -> Class:
         documented.__doc__ = inspect.cleandoc(str(documented.__doc__)).format(**sections)

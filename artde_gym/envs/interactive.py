@@ -1,4 +1,4 @@
-"""What a person can do to an episode that is running."""
+"""User interaction with a running episode."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from artde_gym.sim.engine import Engine
 
 
 class InteractiveMixin(StepLimitMixin, abc.ABC):
-    """A part of an environment: pushes and drops that nobody planned, and a look at its world."""
+    """A mixin of environments: pushes and drops on demand, and access to the engine."""
 
     nominal_robot: RobotSpec
     _engine: Engine
@@ -28,7 +28,7 @@ class InteractiveMixin(StepLimitMixin, abc.ABC):
     fall_reasons: ClassVar[Sequence[str]]
 
     def __copy__(self) -> Self:
-        return copy.deepcopy(self)  # two of them cannot share a world
+        return copy.deepcopy(self)  # environments cannot share an engine
 
     @property
     @abc.abstractmethod
@@ -38,7 +38,7 @@ class InteractiveMixin(StepLimitMixin, abc.ABC):
     @property
     @abc.abstractmethod
     def schedule(self) -> Schedule:
-        """What happens in this episode, and when."""
+        """The scheduled events of this episode."""
 
     def pose(self) -> Pose:
         """Read where robot and payload are, as they are and not as sensors see them."""
@@ -47,7 +47,7 @@ class InteractiveMixin(StepLimitMixin, abc.ABC):
         return Pose(state.position, state.quat_xyzw, state.q, payload, loads)
 
     def push(self, site: str, force: Vector, duration: float = 0.2) -> None:
-        """Push at a site of the robot (N, world axes) from now on, for a while (s).
+        """Push at a site of the robot with `force` (N, world axes) for `duration` (s), starting now.
 
         Raises:
             RobotError: for a site that the robot does not have.
@@ -59,7 +59,7 @@ class InteractiveMixin(StepLimitMixin, abc.ABC):
         self.schedule.add(Push(site, force, first, first + steps))
 
     def drop_payload(self) -> bool:
-        """Drop the payload now; False if there is none."""
+        """Drop the payload now; return False if there is none."""
         dropped = self.schedule.drop(self.elapsed)
         if dropped:
             payload = {**self._sampled["payload"], "detach_time": self.elapsed * self._engine.time_step}
@@ -68,7 +68,7 @@ class InteractiveMixin(StepLimitMixin, abc.ABC):
 
     @property
     def sampled_disturbances(self) -> dict[str, Any]:
-        """The disturbances of this episode in the grammar of `artde_gym.disturbances`, to be given to `reset` again."""
+        """The disturbances of this episode in the grammar of `artde_gym.disturbances`, which `reset` accepts."""
         return copy.deepcopy(dict(self._sampled))
 
     def _sample(self, sampled: Mapping[str, Any]) -> None:
@@ -79,5 +79,5 @@ class InteractiveMixin(StepLimitMixin, abc.ABC):
 
     @property
     def engine(self) -> Engine:
-        """The world that the robot is in, to be looked at."""
+        """The physics engine, for reading."""
         return self._engine

@@ -1,4 +1,4 @@
-"""Reset options that all environments understand."""
+"""Reset options of all environments."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from artde_gym.scenarios import scenario
 
 
 def warn_of_idle(disturbances: Disturbances, duration: float) -> None:
-    """Warn of disturbances that were asked for and can never happen in an episode of `duration` seconds."""
+    """Warn of disturbances that can never happen in an episode of `duration` seconds."""
     for text in disturbances.idle(duration):
         warnings.warn(text, stacklevel=5)  # where gymnasium.make was called
 
 
 def disturbances_in(options: Mapping[str, Any], env: Any) -> Any:
-    """The disturbances that reset options ask for, as they are given or those of a scenario; None if they do not.
+    """Return the disturbances in reset options, given directly or by a scenario; None if there are none.
 
     Raises:
-        OptionError: for an unknown option, or a scenario that needs other arguments than the environment has.
+        OptionError: for an unknown option, or a scenario whose arguments differ from the environment's.
         UnknownNameError: for an unknown scenario.
     """
     if not isinstance(options, Mapping):

@@ -1,4 +1,4 @@
-"""`QuadInfinity-Payload-v0`, one vehicle in a physics engine."""
+"""`QuadInfinity-Payload-v0` for one vehicle in a physics engine."""
 
 from __future__ import annotations
 
@@ -37,9 +37,10 @@ from artde_gym.sim.rotation import matrix
 TIME_STEP = 0.001  # s, of the physics
 STEPS = 5  # physics steps from one grid point to the next
 
-CENTER: Vector = (0.0, 0.0, 0.6)  # m, of the path
-CAMERA = Camera(CENTER, distance=3.0, yaw_deg=35.0, pitch_deg=24.0)
-SHARE, LEEWAY = 0.5, 0.6  # of the vehicle's way from the center; m, that it may be off the picture's middle
+PATH_CENTER: Vector = (0.0, 0.0, 0.6)  # m, of the path
+CAMERA = Camera(PATH_CENTER, distance=3.0, yaw_deg=35.0, pitch_deg=24.0)
+CAMERA_SHARE = 0.5  # of the vehicle's offset from the path's center that the camera does not follow
+CAMERA_SLACK = 0.6  # m, largest distance of the vehicle from the frame's center
 
 _NOTHING = (0.0, 0.0, 0.0)
 _NO_JOINTS = np.zeros(0)
@@ -47,34 +48,32 @@ _NO_JOINTS = np.zeros(0)
 
 @filled(shared=task.DOCUMENTATION)
 class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any]]):
-    """A quadrotor flies an infinity-shaped path with a payload, drops it half-way, and flies the path once more.
+    """A quadrotor flies an infinity-shaped path with a payload, drops it, and flies the path again.
 
     ## Description
     After section 3.5 of Dantu, *Adaptive Artificial Time Delay Control for Robotic Systems* (2023): a Q-450 frame, a
-    payload of 0.35 kg until 35 s, a fan, a low path. The vehicle moves in a physics engine; `gym.make_vec` with
-    `vectorization_mode="vector_entry_point"` gives thousands of the same in NumPy (`artde_gym.envs.quadrotor_vector`).
+    payload of 0.35 kg until 35 s, a fan, a low path. The vehicle is simulated in a physics engine; `gym.make_vec` with
+    `vectorization_mode="vector_entry_point"` simulates thousands in NumPy (`artde_gym.envs.quadrotor_vector`).
 
     {shared}
     | `engine` | None | "bullet", "mujoco", None | physics engine; None: Bullet where it can be imported, else MuJoCo |
     | `width`, `height` | 640, 480 | 16 to 4096 | pixels of a picture |
 
-    With `render_mode="rgb_array"`, `render` draws 30 pictures a simulated second; asked more often, it gives the last
-    one again. Words of your own in `env.unwrapped.view.caption` are written into each of them.
+    With `render_mode="rgb_array"`, `render` draws 30 frames per simulated second and returns the last one again in
+    between. Set `env.unwrapped.view.caption` to add text to each frame.
 
-    Gymnasium's `RecordVideo` takes a picture a step and plays `metadata["render_fps"]` of them a second: up to 100
-    steps a second in real time, and more, at shorter control periods, in slow motion. `artde-gym video` is in real
-    time.
+    Gymnasium's `RecordVideo` records one frame per step and plays `metadata["render_fps"]` of them per second: real
+    time up to 100 steps per second, slow motion at shorter control periods. `artde-gym video` is always in real time.
 
-    `reset(options={{"disturbances": ..., "scenario": "Q1"}})` replaces the disturbances of this and the following
-    episodes, by a mapping or by those of a named scenario; nothing is merged, and what a mapping leaves out does not
-    happen.
+    `reset(options={{"disturbances": ..., "scenario": "Q1"}})` overrides the disturbances of this and the following
+    episodes with a mapping or a named scenario's; nothing is merged: a mapping has to list every disturbance.
 
     ## Info
-    The same keys after `reset` and after `step`, numbers and arrays alone (`artde_gym.info`): `time_s`; the terms of
-    the reward, `reward_alive` and so on; what was sampled, `disturbance.payload.mass` and so on, and the same in the
-    grammar in `env.unwrapped.sampled_disturbances`; how many pushes and payloads began and ended in this control
-    period, `push_begins`, `push_ends`, `payload_attached`, `payload_dropped`; why it crashed, `fell_ground`,
-    `fell_inverted`, `fell_bounds` (true or false).
+    Only numbers and arrays, with the same keys after `reset` and `step` (`artde_gym.info`): `time_s`; the terms of the
+    reward (`reward_alive`, ...); the sampled disturbances (`disturbance.payload.mass`, ...;
+    `env.unwrapped.sampled_disturbances` has them in the grammar); the number of pushes and payloads that began and
+    ended in this control period (`push_begins`, `push_ends`, `payload_attached`, `payload_dropped`); the reason for a
+    crash (`fell_ground`, `fell_inverted`, `fell_bounds`, true or false).
 
     ## Versions
     * v0: first version.
@@ -125,7 +124,9 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
         self._engine: Engine = make_engine(
             self.engine_name, self.nominal_robot, TIME_STEP, renders=render_mode is not None
         )
-        self.view = View(self._engine, CAMERA._replace(width=width, height=height), self.control_period, SHARE, LEEWAY)
+        self.view = View(
+            self._engine, CAMERA._replace(width=width, height=height), self.control_period, CAMERA_SHARE, CAMERA_SLACK
+        )
         self.metadata = {**self.metadata, **self.view.metadata}
         self._engine.reset(START, _NO_JOINTS)
         self._placed = self._engine.save_state()
@@ -136,10 +137,10 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
         warn_of_idle(self._disturbances, self._last * self.control_period)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
-        """Start a flight; `options` are those of the class' documentation.
+        """Start a flight; the class' documentation lists the `options`.
 
         Raises:
-            OptionError: for an unknown option, or a scenario that needs another environment.
+            OptionError: for an unknown option, or a scenario of another environment.
             DisturbanceError: for a malformed disturbance.
         """
         self._require_open()
@@ -177,14 +178,14 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
         return observation, reward, terminated, truncated, self._info(terms, falls, events)
 
     def render(self) -> NDArray[np.uint8] | None:
-        """A picture of the whole path from a camera that flies half-way along; None without a render mode."""
+        """Draw a frame from a camera that follows the vehicle half-way; return None without a render mode."""
         self._require_open()
         if self.render_mode is None:
             return None
         step = self.elapsed
         pushes = self._schedule.acting(step)
         path = self._plan[:, :3]
-        return self.view.picture(step * TIME_STEP, CENTER, pushes, self._sampled, path=path, over=self._over)
+        return self.view.picture(step * TIME_STEP, PATH_CENTER, pushes, self._sampled, path=path, over=self._over)
 
     def close(self) -> None:
         self._engine.close()
@@ -199,7 +200,7 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
         return self._schedule
 
     def _begin(self, sampled: Mapping[str, Any], keys: NDArray[np.uint64]) -> None:
-        """Set an episode up: the vehicle at rest in balance."""
+        """Set up an episode with the vehicle at rest in equilibrium."""
         engine = self._engine
         engine.restore_state(self._placed)
         if "initial_position" in sampled:
@@ -218,11 +219,11 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
         self._read()
 
     def _info(self, terms: dict[str, float], falls: Sequence[bool], events: Sequence[str]) -> dict[str, Any]:
-        """Tell what policies are not meant to see."""
+        """Return the `info`: data that policies must not use."""
         return self._told.told(self._k * self.control_period, terms, events, falls)
 
     def _simulate(self, command: list[float]) -> list[str]:
-        """Let `command` act for one control period, with what disturbs it; returns what began or ended meanwhile."""
+        """Apply `command` and the disturbances for one control period; return the events."""
         engine, events = self._engine, []
         steps = self._ticks * STEPS
         first = self._k * steps
@@ -252,7 +253,7 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
         self._rot = matrix(self._state.quat_xyzw)
 
     def _drag(self) -> Vector:
-        """Force of the air until the next grid point (N), body axes."""
+        """Return the aerodynamic force until the next grid point (N, body axes)."""
         state, (xx, xy, xz, yx, yy, yz, zx, zy, zz) = self._state, self._rot
         wx, wy, wz = _NOTHING if self._wind is None else self._wind.next(state.position)
         vx, vy, vz = state.velocity
@@ -260,12 +261,12 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
         return xx * x + yx * y + zx * z, xy * x + yy * y + zy * z, xz * x + yz * y + zz * z
 
     def _gains(self) -> Array:
-        """Gain of each rotor's thrust (4,) until the next grid point."""
+        """Return the gain of each rotor's thrust (4,) until the next grid point."""
         heights = np.array(robot.rotor_heights(self._state.position[2], self._rot[6], self._rot[7]))
         return thrust_gain(heights, robot.ROTOR_RADIUS, self._ground_effect, np.maximum)
 
     def _measure(self) -> Array:
-        """The observation of the state that was read last."""
+        """Return the observation of the last state read."""
         state, rot = self._state, self._rot
         wx, wy, wz = state.angular_velocity
         rates = (rot[i] * wx + rot[3 + i] * wy + rot[6 + i] * wz for i in range(3))

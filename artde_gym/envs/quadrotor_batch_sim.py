@@ -1,7 +1,7 @@
-"""Many quadrotors at once, in NumPy alone: what `artde_gym.envs.quadrotor` lets an engine do, with rigid bodies.
+"""NumPy simulation of many quadrotors as rigid bodies; the counterpart of the engine in `artde_gym.envs.quadrotor`.
 
-Vehicle and payload are one body until the payload is dropped. Everything happens on the grid of `GRID`: forces act over
-a step, the air is that where the vehicle is in the middle of it, and what begins or ends does so with a step.
+Vehicle and payload are one body until the payload is dropped. Time has the grid `GRID`: forces are constant over a
+step, the wind is taken at the vehicle's position in the middle of the step, and events occur between steps.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from artde_gym.robots.q450 import task
 from artde_gym.sim.engine import PAYLOAD_RADIUS
 from artde_gym.sim.rigid_bodies import MassProperties, RigidBodies, composite, cross, times, transposed_times
 
-FINE = 0.001  # s, resolution of pushes
-PARTS = round(GRID / FINE)
-SLOTS = int(OWN["action_delay"].parameters[0].high) + 1  # commands that a delay has to remember
+PUSH_RESOLUTION = 0.001  # s
+PARTS = round(GRID / PUSH_RESOLUTION)
+DELAY_SLOTS = int(OWN["action_delay"].parameters[0].high) + 1  # commands stored for the longest delay
 
 _SITES = {name: place for name, _, place in robot.q450().sites}
 
 
 class _Event(NamedTuple):
-    """What happens to one vehicle at the beginning of a step; `told` are those of `EVENTS` that it is."""
+    """An event of one vehicle at the beginning of a step; `told` are its names in `EVENTS`."""
 
     step: int
     told: tuple[str, ...]
@@ -42,16 +42,16 @@ class _Event(NamedTuple):
 
 
 class QuadrotorBatchSim:
-    """`n` vehicles.
+    """A simulation of `n` vehicles.
 
     Args:
-        n: how many.
-        steps: grid steps of a control period.
-        dtype: of all numbers.
+        n: number of vehicles.
+        steps: grid steps per control period.
+        dtype: data type of all numbers.
 
     Attributes:
-        bodies: their motion.
-        thrusts: of the rotors now (4, n) (N).
+        bodies: rigid-body states.
+        thrusts: current thrusts of the rotors (4, n) (N).
         wrenches: mean [u1, u2, u3, u4] of the last control period (4, n) (N, Nm), without the gain near the ground.
     """
 
@@ -59,14 +59,14 @@ class QuadrotorBatchSim:
         self.bodies = RigidBodies(n, dtype)
         self.thrusts, self.wrenches = np.zeros((4, n), dtype), np.zeros((4, n), dtype)
         self._steps = steps
-        self._step = 0  # since the fleet was built
-        self._begun = np.zeros(n, np.int64)  # at which step each episode began
+        self._step = 0  # since construction
+        self._begun = np.zeros(n, np.int64)  # step at which each episode began
         self._agenda: list[list[_Event]] = [[] for _ in range(n)]  # of each vehicle, the next event last
         self._due = np.full(n, NEVER)  # step of each vehicle's next event
         self._shares = np.zeros((2, n), dtype)  # of the rotors' lag
-        self._left = np.ones((4, n), dtype)  # share of each rotor's thrust
+        self._left = np.ones((4, n), dtype)  # remaining share of each rotor's thrust
         self._delay = np.zeros(n, np.int64)  # control periods
-        self._late: Array | None = None  # aims of the last periods (SLOTS, 4, n), once a vehicle needs them
+        self._late: Array | None = None  # targets of the last periods (DELAY_SLOTS, 4, n), once a vehicle needs them
         self._air = np.zeros((len(Air._fields), n), dtype)
         self._keys = np.zeros(n, np.uint64)
         self._wind = np.zeros((4, n), dtype)  # states of the wind's processes
@@ -74,11 +74,11 @@ class QuadrotorBatchSim:
         self._windy = False
         self._ground_effect = np.zeros(n, dtype)
         self._pushes = np.zeros((0, 3, n), dtype)  # forces that act (N, world axes)
-        self._places = np.zeros((0, 3, n), dtype)  # where (m, body axes)
+        self._places = np.zeros((0, 3, n), dtype)  # points of application (m, body axes)
         self._effects = Effects(n, task.WORDS)
 
     def begin(self, vehicle: int, sampled: Mapping[str, Any], key: np.uint64) -> None:
-        """Begin an episode of one vehicle, at rest in balance, with sampled disturbances and the key of its wind."""
+        """Begin an episode of one vehicle in equilibrium, with sampled disturbances and the key of its wind."""
         self._begun[vehicle] = self._step
         self._begin_rotors(vehicle, sampled)
         self._effects.begin(vehicle, sampled)
@@ -109,16 +109,16 @@ class QuadrotorBatchSim:
         self._await(vehicle)
 
     def rest(self, vehicle: int) -> None:
-        """Let nothing more happen to a vehicle until it begins anew."""
+        """Cancel all events of a vehicle until its next episode."""
         self._agenda[vehicle] = []
         self._await(vehicle)
 
     def motion(self, vehicles: NDArray[np.int64]) -> list[Array]:
-        """What of some vehicles changes from step to step, to be given back to `stop`."""
+        """Copy the motion state of some vehicles for `stop`."""
         return [part[..., vehicles] for part in self._moving()]
 
     def stop(self, vehicles: NDArray[np.int64], motion: list[Array]) -> None:
-        """Undo how some vehicles have moved."""
+        """Restore the motion state of some vehicles."""
         for part, before in zip(self._moving(), motion, strict=True):
             part[..., vehicles] = before
 
@@ -126,7 +126,7 @@ class QuadrotorBatchSim:
         return *self.bodies.motion(), self.thrusts, self.wrenches
 
     def advance(self, commands: Array) -> dict[int, list[str]]:
-        """Let wrenches [u1, u2, u3, u4] (4, n) (N, Nm) act for one control period; returns events by vehicle."""
+        """Apply wrenches [u1, u2, u3, u4] (4, n) (N, Nm) for one control period; return events by vehicle."""
         events: dict[int, list[str]] = {}
         bodies, aims = self.bodies, self._aims(commands)
         goals = aims * self._left
@@ -159,27 +159,27 @@ class QuadrotorBatchSim:
         self._left[:, vehicle] = 1.0
         self._delay[vehicle] = sampled.get("action_delay", {}).get("steps", 0)
         if self._late is None and self._delay[vehicle]:
-            self._late = np.zeros((SLOTS, *self.thrusts.shape), self.thrusts.dtype)
+            self._late = np.zeros((DELAY_SLOTS, *self.thrusts.shape), self.thrusts.dtype)
         if self._late is not None:
             self._late[..., vehicle] = hover
 
     def _aims(self, commands: Array) -> Array:
-        """What the rotors aim at (4, n) (N) during a control period that begins with these commands."""
+        """Return the rotors' thrust targets (4, n) (N) for a control period that begins with these commands."""
         aims = np.stack(robot.thrusts(*commands))
         np.clip(aims, 0.0, robot.MAX_THRUST, out=aims)
         if self._late is None:
             return aims
         period = self._step // self._steps
-        self._late[period % SLOTS] = aims
-        return self._late[(period - self._delay) % SLOTS, :, np.arange(aims.shape[1])].T
+        self._late[period % DELAY_SLOTS] = aims
+        return self._late[(period - self._delay) % DELAY_SLOTS, :, np.arange(aims.shape[1])].T
 
     def _noise(self) -> Array:
-        """Noise of the wind for the steps of this control period (4, steps, n)."""
+        """Return the noise of the wind for the steps of this control period (4, steps, n)."""
         index = (self._step - self._begun).astype(np.uint64) + np.arange(self._steps, dtype=np.uint64)[:, None]
         return uniform_noise(self._keys, index, self.thrusts.dtype)
 
     def _blow(self, origin: Array, noise: Array) -> Array:
-        """Velocity of the air at each vehicle's place during this step (3, n) (m/s), world axes."""
+        """Return the wind velocity at each vehicle during this step (3, n) (m/s, world axes)."""
         (x, y, z), (ambient_x, ambient_y, ambient_z, turbulence) = origin, self._wind
         states = ambient_x, ambient_y, ambient_z, turbulence
         wind = np.stack(velocity(Air._make(self._air), states, (x, y, z), np.exp))
@@ -187,14 +187,14 @@ class QuadrotorBatchSim:
         return wind
 
     def _gains(self, height: Array) -> Array | float:
-        """Gain of each rotor's thrust near the ground (4, n)."""
+        """Return the gain of each rotor's thrust near the ground (4, n)."""
         if not self._ground_effect.any():
             return 1.0
         heights = np.stack(robot.rotor_heights(height, *self.bodies.rot[2, :2]))
         return thrust_gain(heights, robot.ROTOR_RADIUS, self._ground_effect, np.maximum)
 
     def _pushed(self, force: Array, torque: Array) -> tuple[Array, Array]:
-        """Force and torque with those of the pushes that act."""
+        """Return force and torque with active pushes added."""
         for push, place in zip(self._pushes, self._places, strict=True):
             acts = push.any(axis=0)
             if acts.any():
@@ -203,7 +203,7 @@ class QuadrotorBatchSim:
         return force, torque
 
     def _loaded(self, force: Array, torque: Array, origin: Array) -> tuple[Array, Array]:
-        """Force and torque with those of effects."""
+        """Return force and torque with effects added."""
         if self._effects.acting.any():
             load = self._effects.load(self._states(origin))
             if load.force is not None:
@@ -213,15 +213,15 @@ class QuadrotorBatchSim:
         return force, torque
 
     def _states(self, origin: Array) -> RobotStates:
-        """The states of all vehicles now, whose origins are known; they have no joints."""
+        """Return the current states of all vehicles at known origins; they have no joints."""
         bodies, joints = self.bodies, np.zeros((origin.shape[1], 0))
         spin = times(bodies.rot, bodies.rates)
         parts = (np.ascontiguousarray(part.T) for part in (origin, bodies.quat_xyzw, bodies.origin_velocity(), spin))
         return RobotStates((self._step - self._begun) * GRID, joints, joints, *parts)
 
     def _push_events(self, vehicle: int, sampled: Mapping[str, Any]) -> list[_Event]:
-        """Pushes act for the share of a step that they cover."""
-        pushes = [Push.of(entry, FINE) for entry in sampled.get("push", ())]
+        """Return the events of the pushes; a push acts for the share of a step that it covers."""
+        pushes = [Push.of(entry, PUSH_RESOLUTION) for entry in sampled.get("push", ())]
         missing = len(pushes) - len(self._pushes)
         if missing > 0:
             more = np.zeros((missing, *self._pushes.shape[1:]), self._pushes.dtype)
@@ -256,7 +256,7 @@ class QuadrotorBatchSim:
         self._left[rotor, vehicle] *= factor
 
     def _happen(self, told: dict[int, list[str]]) -> None:
-        """Bring about what is due, and tell of it."""
+        """Run due events and record their names in `told`."""
         for vehicle in np.flatnonzero(self._due <= self._step).tolist():
             agenda = self._agenda[vehicle]
             while agenda and self._begun[vehicle] + agenda[-1].step <= self._step:

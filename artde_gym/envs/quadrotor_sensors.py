@@ -1,4 +1,4 @@
-"""From a quadrotor's state to its observation: motion capture, and noise as a disturbance."""
+"""Sensors of a quadrotor: motion capture, and noise as a disturbance."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Measurement = Literal["ideal", "mocap"]
 
 
 class Sensors:
-    """The sensors of `n` vehicles that are sampled every `period` seconds.
+    """The sensors of `n` vehicles, sampled every `period` seconds.
 
     Raises:
         OptionError: for an unknown `measurement`.
@@ -33,7 +33,7 @@ class Sensors:
         self._keys = np.zeros((2, n), np.uint64)
 
     def begin(self, vehicle: int, sampled: Mapping[str, Any], keys: NDArray[np.uint64]) -> None:
-        """Begin an episode of one vehicle, with sampled disturbances and two keys of its noise."""
+        """Begin an episode of one vehicle with sampled disturbances and two keys of its noise."""
         self._keys[:, vehicle] = keys
         if self._noise is None and "sensor_noise" in sampled:
             self._noise = VehicleNoise(self._n, self._dtype)
@@ -42,18 +42,18 @@ class Sensors:
 
     @property
     def ideal(self) -> bool:
-        """Whether what is measured is the truth."""
+        """True if measurements have no error."""
         return self._mocap is None and self._noise is None
 
     def measure(self, observation: Array, sample: NDArray[np.int64], new: NDArray[np.bool_] | None = None) -> None:
-        """Replace the truth in observations (size, n) by what is measured, `sample` periods after the start (n,).
+        """Replace true values in observations (size, n) by measurements, `sample` (n,) periods after the start.
 
-        `new` (n,) says where a sample is looked at for the first time; without, everywhere.
+        `new` (n,) marks vehicles whose sample is read for the first time; None: all of them.
         """
         measured = (
             observation[POSITION],
             observation[VELOCITY],
-            observation[ROT].reshape(3, 3, -1),  # a view, as rows lie apart by the same distance
+            observation[ROT].reshape(3, 3, -1),  # a view, since the rows have a constant stride
             observation[RATES],
         )
         if self._mocap is not None:

@@ -1,4 +1,4 @@
-"""`QuadInfinity-Payload-v0`, many vehicles at once in NumPy."""
+"""`QuadInfinity-Payload-v0` for many vehicles at once in NumPy."""
 
 from __future__ import annotations
 
@@ -22,35 +22,35 @@ from artde_gym.errors import OptionError
 from artde_gym.robots.q450 import model as robot
 from artde_gym.robots.q450 import task
 
-FLEET = 4096  # vehicles that are simulated together; with more, arrays no longer fit into caches
+FLEET = 4096  # vehicles simulated together; larger arrays do not fit into caches
 
 
 @filled(shared=task.DOCUMENTATION)
 class QuadInfinityPayloadVectorEnv(BaseVectorEnv):
-    """Many quadrotors at once fly an infinity-shaped path with a payload, drop it half-way, and fly it once more.
+    """Many quadrotors at once fly an infinity-shaped path with a payload, drop it, and fly the path again.
 
     ## Description
-    The task of `artde_gym.envs.quadrotor`, for `gym.make_vec(..., vectorization_mode="vector_entry_point")`: same
-    layouts, disturbances, seeds and winds, with rigid bodies in NumPy in place of an engine (within 1 mm after 10 s).
-    Vehicle and payload are one rigid body until the drop. An environment does the same to the bit whatever the number
-    of environments beside it. Each has a generator of its own.
+    The task of `artde_gym.envs.quadrotor` for `gym.make_vec(..., vectorization_mode="vector_entry_point")`, with the
+    same layouts, disturbances, seeds and winds, but rigid bodies in NumPy instead of an engine (within 1 mm after
+    10 s). Vehicle and payload are one rigid body until the drop. Each environment has its own random generator, and
+    its results are bitwise independent of the number of environments.
 
-    A flight that is over begins anew with the next step, which ignores its action; with `autoreset_mode="SameStep"` it
-    begins anew at once, and `info["final_obs"]` and `info["final_info"]` tell how it ended; with `"Disabled"` it waits,
-    unmoved, until a reset whose mask (option `"reset_mask"`, (n,)) it is in.
+    A finished flight restarts with the next step, which ignores its action; with `autoreset_mode="SameStep"` it
+    restarts in the same step, with its last observation and info in `info["final_obs"]` and `info["final_info"]`; with
+    `"Disabled"` it stays as it is until a reset whose mask (option `"reset_mask"`, (n,)) includes it.
     Observations are a transposed array, (size, n) in memory, so that each component is contiguous.
 
     {shared}
     | `num_envs` | 1 | from 1 | number of vehicles |
-    | `dtype` | "float64" | "float64", "float32" | of all numbers, observations and actions included |
-    | `engine` | None | None, "numpy" | where it runs; None warns that it is not the engine of `gym.make` |
+    | `dtype` | "float64" | "float64", "float32" | data type of all numbers, including observations and actions |
+    | `engine` | None | None, "numpy" | physics engine; None warns that `gym.make` uses another one |
     | `autoreset_mode` | "NextStep" | "NextStep", "SameStep", "Disabled" | Gymnasium's `AutoresetMode` |
-    | `max_episode_steps` | None | from 1 | after which a flight is truncated, if its duration is longer |
-    | `render_mode` | None | None | `vectorization_mode="sync"` draws pictures |
+    | `max_episode_steps` | None | from 1 | steps after which a flight is truncated, if its duration is longer |
+    | `render_mode` | None | None | use `vectorization_mode="sync"` to render |
 
     ## Info
-    That of the single environment, each entry `x` with a mask `_x` (n,), in nested dictionaries too: numbers and
-    booleans (n,), arrays (n, ...). `env.unwrapped.sampled_disturbances` is a list.
+    As in the single environment, each entry `x` with a mask `_x` (n,), in nested dictionaries too: numbers and
+    Booleans (n,), arrays (n, ...). `env.unwrapped.sampled_disturbances` is a list.
 
     ## Versions
     * v0: first version.
@@ -112,7 +112,7 @@ class QuadInfinityPayloadVectorEnv(BaseVectorEnv):
             (slice(first, first + size), QuadrotorBatchSim(size, steps, self.dtype))
             for first, size in zip(range(0, num_envs, FLEET), sizes, strict=True)
         ]
-        self._before: list[Array] = []  # thrusts of the fleets a control period ago
+        self._before: list[Array] = []  # thrusts of each fleet one control period ago
 
     def _parse(self, disturbances: Mapping[str, Any]) -> Disturbances:
         return task.parse(disturbances)
@@ -182,7 +182,7 @@ class QuadInfinityPayloadVectorEnv(BaseVectorEnv):
 
 
 def _square(vectors: Array) -> Array:
-    """Squared norms of vectors (size, n), the order of the sum fixed."""
+    """Return squared norms of vectors (size, n), summed in a fixed order."""
     squares = vectors * vectors
     total = squares[0]
     for component in squares[1:]:

@@ -1,4 +1,4 @@
-"""The number of steps of an episode, told by an environment's `spec`."""
+"""Episode length as `max_episode_steps` of an environment's `spec`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 
 class _Spec:
-    """The attribute `spec` of an environment: what Gymnasium puts there, and the number of steps."""
+    """The attribute `spec` of an environment: Gymnasium's value, with the number of steps added."""
 
     def __get__(self, env: Any, owner: type) -> Any:
         return None if env is None else vars(env).get("_spec")
@@ -19,7 +19,7 @@ class _Spec:
 
 
 class StepLimitMixin:
-    """A part of an environment whose episodes end after a number of steps that follows from its arguments."""
+    """A mixin of environments whose arguments determine the number of steps of an episode."""
 
     spec: Any = _Spec()
     _last: int  # control period with which an episode ends

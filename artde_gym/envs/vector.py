@@ -1,4 +1,4 @@
-"""What environments of many robots share: Gymnasium's conventions of vectors, seeds, masks, and ends of episodes."""
+"""Base class of vector environments: Gymnasium's conventions for vectors, seeds, masks and ends of episodes."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ Order = Literal["C", "F"]
 
 
 class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
-    """Many environments in one. Each has a generator of its own, and does the same whatever the number beside it.
+    """Many environments in one, each with its own random generator and independent of their number.
 
-    A subclass says what happens; observations and actions are (n, size), in its `order` of memory.
+    A subclass defines the task; observations and actions are (n, size), in its memory `order`.
 
     Args:
         num_envs: number of environments.
-        dtype: of all numbers.
-        engine: None for the one in which this class runs, with a warning if `gym.make` would take another one.
-        render_mode: None; a picture is drawn by single environments.
-        autoreset_mode: Gymnasium's. With `NEXT_STEP` an episode that is over begins anew with the next step, which
-            ignores its action; with `SAME_STEP` at once, its last observation and info being in `info["final_obs"]` and
-            `info["final_info"]`; with `DISABLED` it waits for a reset, unmoved.
-        max_episode_steps: after which an episode is truncated, if its duration is longer.
+        dtype: data type of all numbers.
+        engine: None for the engine of this class, with a warning if `gym.make` would use another one.
+        render_mode: None; only single environments render.
+        autoreset_mode: Gymnasium's. With `NEXT_STEP` a finished episode restarts with the next step, which ignores its
+            action; with `SAME_STEP` in the same step, with its last observation and info in `info["final_obs"]` and
+            `info["final_info"]`; with `DISABLED` it stays as it is until a reset.
+        max_episode_steps: steps after which an episode is truncated, if its duration is longer.
 
     Raises:
         OptionError: for an argument out of range.
@@ -66,7 +66,7 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
     words: Words
     _disturbances: Disturbances
     _apart: Sequence[Disturbances] = ()  # of each environment, where they differ
-    _np_random: Any  # a list: one for each environment, as for the seeds
+    _np_random: Any  # a list with one entry per environment, as the seeds
     _np_random_seed: Any
 
     def __init__(
@@ -105,37 +105,37 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
 
     @abc.abstractmethod
     def _parse(self, disturbances: Mapping[str, Any]) -> Disturbances:
-        """Read disturbances of this robot."""
+        """Parse disturbances of this robot."""
 
     @abc.abstractmethod
     def _start(self, drawn: Mapping[int, Mapping[str, Any]]) -> None:
-        """Begin episodes in some environments, with sampled disturbances."""
+        """Begin episodes in some environments with sampled disturbances."""
 
     @abc.abstractmethod
     def _advance(self, commands: Array, goes_on: Mask) -> dict[int, list[str]]:
-        """Let actions act for a control period; returns events by environment. Nobody looks where none goes on."""
+        """Apply actions for a control period; return events by environment. Only results where `goes_on` are used."""
 
     @abc.abstractmethod
     def _truth(self) -> Array:
-        """The observations without errors of measurement (n, size), a new array."""
+        """Return the observations without measurement errors (n, size), a new array."""
 
     @abc.abstractmethod
     def _measure(self, observations: Array, new: Mask) -> None:
-        """Replace the truth by what sensors make of it; where it is not `new`, by what they made of it before."""
+        """Replace true values by measurements: new ones where `new`, else the previous ones."""
 
     @abc.abstractmethod
     def _score(self, truth: Array) -> tuple[dict[str, Array], Sequence[Mask]]:
-        """The terms of the reward, and where each reason of a fall holds."""
+        """Return the terms of the reward, and masks of the reasons for a fall."""
 
     def _tell(self) -> dict[str, Array]:
-        """More entries of `info`, by name, one value an environment."""
+        """Return further entries of `info` by name, one value per environment."""
         return {}
 
     def _end(self, ended: Mask) -> None:
-        """Episodes have ended and wait; they are not to move."""
+        """Hold environments whose episodes have ended until their reset."""
 
     def __copy__(self) -> Self:
-        return copy.deepcopy(self)  # two of them cannot share their worlds
+        return copy.deepcopy(self)  # environments cannot share an engine
 
     @property
     def sampled_disturbances(self) -> list[dict[str, Any]]:
@@ -143,7 +143,7 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
         return [copy.deepcopy(dict(sampled)) for sampled in self._sampled]
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
-        """An attribute, once for each environment."""
+        """Return an attribute, once for each environment."""
         return (getattr(self, name),) * self.num_envs
 
     def reset(
@@ -152,12 +152,12 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
         """Start episodes.
 
         Args:
-            seed: one for each environment, or a number from which on they count; without, the generators go on.
-            options: those of the class' documentation, "disturbances" also as a list, one mapping for each environment;
-                and Gymnasium's "reset_mask" (n,), where to reset.
+            seed: one per environment, or the first of consecutive seeds; None: the generators continue.
+            options: see the class' documentation, "disturbances" also as a list, one mapping per environment; also
+                Gymnasium's "reset_mask" (n,), the environments to reset.
 
         Raises:
-            OptionError: for an unknown option or value, or a scenario that needs another environment.
+            OptionError: for an unknown option or value, or a scenario of another environment.
             DisturbanceError: for a malformed disturbance.
         """
         require_open(closed=self.closed)
@@ -182,10 +182,10 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
         return observations, self._info(mask, told)
 
     def step(self, actions: ArrayLike) -> tuple[Array, Array, Mask, Mask, dict[str, Any]]:
-        """Apply actions for one control period; episodes that were over begin anew instead, or wait.
+        """Apply actions for one control period; finished episodes restart instead, or wait.
 
         Raises:
-            ActionError: for a wrong shape, or a value that is not finite in an episode that goes on.
+            ActionError: for a wrong shape, or a value that is not finite in a running episode.
             gymnasium.error.ResetNeeded: before the first reset.
             gymnasium.error.ClosedEnvironmentError: after `close`.
         """
@@ -220,16 +220,16 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
         return observations, rewards, terminated, truncated, info
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Free what the environment holds; see `close`."""
+        """Free the environment's resources; see `close`."""
 
     def _check_engine(self, engine: str | None) -> None:
-        """Tell where a vector runs that nobody has asked to run there."""
+        """Warn if the engine was not chosen and differs from the one of `gym.make`."""
         if engine is None:
             default = resolve_engine(None)
             if default != self.own_engine:
                 warnings.warn(
-                    f"{type(self).__name__} runs in {self.own_engine!r}, gym.make in {default!r} unless told "
-                    f"otherwise, so that results differ; give engine={self.own_engine!r} if this is meant",
+                    f"{type(self).__name__} uses engine {self.own_engine!r}, but gym.make uses {default!r} by default: "
+                    f"results will differ; pass engine={self.own_engine!r} to silence this warning",
                     stacklevel=6,  # where gymnasium.make_vec was called
                 )
         elif engine != self.own_engine:
@@ -251,7 +251,7 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
     def _renew(
         self, observations: Array, info: dict[str, Any], told: Columns, ended: Mask
     ) -> tuple[Array, dict[str, Any]]:
-        """Begin episodes anew in the step that has ended them."""
+        """Restart episodes in the step that ended them."""
         final = {"final_obs": np.where(ended[:, None], observations, 0.0), "final_info": masked(info, ended)}
         self._begin(ended)
         renewed = self._truth()
@@ -260,7 +260,7 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
         return renewed, begun | masked(final, ended.copy())
 
     def _commands(self, actions: ArrayLike) -> Array:
-        """Checked actions as an array of ours."""
+        """Check actions and copy them into an array."""
         shape = self.action_space.shape
         with np.errstate(over="ignore"):  # of a cast to float32
             commands = real_array("actions", actions, f"numbers of the shape {shape}", self.dtype, self.order)
@@ -278,7 +278,7 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
             return np.ones(self.num_envs, np.bool_)
         mask = np.asarray(given)
         if mask.dtype != np.bool_ or mask.shape != (self.num_envs,) or not mask.any():
-            raise OptionError("reset_mask", given, f"({self.num_envs},) truth values, one of them true at least")
+            raise OptionError("reset_mask", given, f"({self.num_envs},) Booleans, at least one of them true")
         if self._over is None and not mask.all():
             raise OptionError("reset_mask", given, "all true in the first reset")
         return mask
@@ -300,15 +300,15 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
         self._k[mask] = 0
         self._start(drawn)
         if mask.all():
-            self._table = SampledTable(self.num_envs)  # without the room that other disturbances have needed
+            self._table = SampledTable(self.num_envs)  # without the columns that earlier disturbances needed
         for i, sampled in drawn.items():
             self._sampled[i] = sampled
         self._table.enter({i: numeric(sampled, self.words) for i, sampled in drawn.items()})
 
     def _info(self, mask: Mask, told: Columns) -> dict[str, Any]:
-        """Tell of the environments in a mask what policies are not meant to see.
+        """Return the `info` of the environments in a mask: data that policies must not use.
 
-        `told` are terms of the reward, counts of events, and reasons of falls.
+        `told` are terms of the reward, counts of events, and reasons for falls.
         """
         own = {"time_s": self._k * self.control_period, **self._tell(), **self._table.told(), **told}
         return masked(own, mask.copy())
@@ -322,7 +322,7 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
         return counts
 
     def _reasons(self, terminated: Mask, falls: Sequence[Mask]) -> Columns:
-        """Mark the first reason that holds, where an episode was terminated."""
+        """Mark the first reason that holds where an episode was terminated."""
         reasons: Columns = {}
         left = terminated
         for name, fell in zip(self.fall_reasons, falls, strict=True):
@@ -332,7 +332,7 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
 
 
 def _mode(given: AutoresetMode | str) -> AutoresetMode:
-    """Gymnasium's mode, by itself, its name or its value."""
+    """Return Gymnasium's mode, given as such or by its name or value."""
     for mode in AutoresetMode:
         if given in (mode, mode.value, mode.name):
             return mode

@@ -1,4 +1,4 @@
-"""What an environment's `render` shows: an engine's picture, with pushes, the time and the disturbances on top."""
+"""Frames for `render`: an engine's image, overlaid with pushes, the time and the disturbances."""
 
 from __future__ import annotations
 
@@ -17,37 +17,38 @@ from artde_gym.multibody.spec import Vector
 from artde_gym.sim.camera import Camera
 from artde_gym.sim.engine import Engine
 
-RATE = 30.0  # pictures a simulated second
-MAX_FPS, SLOW_FPS = 100.0, 50.0  # frames/s: what a video can have, and has in slow motion where steps are shorter
-SIZES = (16, 4096)  # pixels, of a picture's sides
+RATE = 30.0  # frames per simulated second
+MAX_FPS, SLOW_FPS = 100.0, 50.0  # frames/s: the most that a video can have; its rate in slow motion
+FRAME_SIZES = (16, 4096)  # pixels, smallest and largest width or height
 PUSH = (196, 22, 60)
 PATH = (120, 130, 150)
 INK = (27, 31, 36)
-METRES_PER_NEWTON = 0.012  # of an arrow
-ARROW = (0.16, 0.6)  # m, its shortest and longest
-FINER = 3  # of the raster on which lines are drawn, so that their edges are smooth
+METERS_PER_NEWTON = 0.012  # length of a push's arrow
+ARROW_LENGTHS = (0.16, 0.6)  # m, smallest and largest
+OVERSAMPLING = 3  # of drawn lines, for smooth edges
 
 
 class View:
-    """Pictures of an engine's robot.
+    """Frames of an engine's robot.
 
     Args:
-        engine: which draws the robot.
-        camera: distance, angles and size; its target is what the camera looks at while the robot is there.
-        control_period: s.
-        share: how much of the robot's way from there the camera leaves to it, 0 (always in the middle) to 1, up to
-        slack: the farthest from the middle that the robot may go (m).
+        engine: engine that draws the robot.
+        camera: distance, angles, size, and the target while the robot is at its nominal position.
+        control_period: control period (s).
+        share: share of the robot's offset from its nominal position that the camera does not follow: from 0 (the robot
+            stays in the center of the frame) to 1.
+        slack: largest distance of the robot from the center of the frame (m).
 
     Attributes:
-        camera: where it is in the beginning.
-        caption: words of the user's in every picture, such as the controller's name.
+        camera: the camera's initial pose.
+        caption: the user's text in every frame, such as the controller's name.
 
     Raises:
         OptionError: for a size out of range.
     """
 
     def __init__(self, engine: Engine, camera: Camera, control_period: float, share: float, slack: float) -> None:
-        low, high = SIZES
+        low, high = FRAME_SIZES
         for name in ("width", "height"):
             size = getattr(camera, name)
             if not (isinstance(size, int) and low <= size <= high):
@@ -60,7 +61,7 @@ class View:
         self._last: tuple[Any, NDArray[np.uint8]] | None = None
 
     def reset(self) -> None:
-        """Forget the last picture."""
+        """Discard the last frame."""
         self._last = None
 
     def picture(
@@ -73,15 +74,16 @@ class View:
         path: ArrayLike | None = None,
         over: bool = False,
     ) -> NDArray[np.uint8]:
-        """The picture at a time: a new one `RATE` times a second, and in the end; in between the last one.
+        """Return the frame at a time: a new one `RATE` times per second and at the end, else the last one.
 
-        Whoever asks after every step, as `RecordVideo` does, so need not wait for a thousand pictures a second.
+        This keeps callers fast that ask after every step, as `RecordVideo` does.
 
         Args:
-            home: where the robot is meant to be (m).
-            pushes: that act now.
-            disturbances: of the episode, sampled.
-            path: (n, 3), drawn as a line (m).
+            time_s: simulated time (s).
+            home: nominal position of the robot (m).
+            pushes: active pushes.
+            disturbances: sampled disturbances of the episode.
+            path: points (n, 3) of a line (m).
             over: whether the episode has ended.
         """
         key = (int(time_s * RATE + 1e-6), over)
@@ -100,7 +102,7 @@ class View:
         return self._last[1].copy()
 
     def following(self, home: Vector) -> Camera:
-        """Where the camera is now."""
+        """Return the current camera."""
         position = np.asarray(self._engine.state().position)
         off = np.clip(self._share * (position - home), -self._slack, self._slack)
         x, y, _ = (position - off).tolist()
@@ -108,7 +110,7 @@ class View:
 
 
 def _words(disturbances: Mapping[str, Any], time_s: float) -> list[str]:
-    """What disturbs the robot at a time; pushes are shown where they act."""
+    """Return labels of the active disturbances; pushes are drawn where they act."""
     words = []
     for kind, values in disturbances.items():
         if kind == "payload":
@@ -122,17 +124,17 @@ def _words(disturbances: Mapping[str, Any], time_s: float) -> list[str]:
 
 
 def _arrow(picture: Image.Image, camera: Camera, point: Vector, force: Vector) -> None:
-    """A force (N) that presses on a point (m), longer for a larger one."""
+    """Draw a force (N) on a point (m) as an arrow; a larger force is longer."""
     size = float(np.linalg.norm(force))
     if size == 0.0:
         return
-    length = float(np.clip(METRES_PER_NEWTON * size, *ARROW))
+    length = float(np.clip(METERS_PER_NEWTON * size, *ARROW_LENGTHS))
     end = np.asarray(point)
     tail, tip = camera.pixels([end - length * np.asarray(force) / size, end])
     along = tip - tail
     seen = float(np.linalg.norm(along))
     if not seen > 1.0:
-        return  # towards the eye
+        return  # points at the camera
     along /= seen
     across = np.array([-along[1], along[0]])
     wide = picture.height / 110
@@ -147,26 +149,26 @@ def _arrow(picture: Image.Image, camera: Camera, point: Vector, force: Vector) -
 
 
 def _fill(picture: Image.Image, corners: Sequence[Array], color: tuple[int, int, int]) -> None:
-    """A polygon with smooth edges and a white rim."""
-    points = [(FINER * float(x), FINER * float(y)) for x, y in corners]
-    rim = Image.new("L", (FINER * picture.width, FINER * picture.height))
-    ImageDraw.Draw(rim).line([*points, points[0]], 255, 2 * FINER, "curve")
+    """Draw a polygon with smooth edges and a white rim."""
+    points = [(OVERSAMPLING * float(x), OVERSAMPLING * float(y)) for x, y in corners]
+    rim = Image.new("L", (OVERSAMPLING * picture.width, OVERSAMPLING * picture.height))
+    ImageDraw.Draw(rim).line([*points, points[0]], 255, 2 * OVERSAMPLING, "curve")
     body = Image.new("L", rim.size)
     ImageDraw.Draw(body).polygon(points, 255)
-    picture.paste((255, 255, 255), None, rim.reduce(FINER))
-    picture.paste(color, None, body.reduce(FINER))
+    picture.paste((255, 255, 255), None, rim.reduce(OVERSAMPLING))
+    picture.paste(color, None, body.reduce(OVERSAMPLING))
 
 
 def _line(picture: Image.Image, points: Array, color: tuple[int, int, int]) -> None:
-    """A thin line through pixels (n, 2), half transparent."""
-    mask = Image.new("L", (FINER * picture.width, FINER * picture.height))
+    """Draw a thin, half-transparent line through pixels (n, 2)."""
+    mask = Image.new("L", (OVERSAMPLING * picture.width, OVERSAMPLING * picture.height))
     whole = np.isfinite(points).all(axis=1)
-    ImageDraw.Draw(mask).line([*map(tuple, (FINER * points[whole]).tolist())], 150, FINER)
-    picture.paste(color, None, mask.reduce(FINER))
+    ImageDraw.Draw(mask).line([*map(tuple, (OVERSAMPLING * points[whole]).tolist())], 150, OVERSAMPLING)
+    picture.paste(color, None, mask.reduce(OVERSAMPLING))
 
 
 def _write(picture: Image.Image, lines: Sequence[str]) -> None:
-    """Lines of text in the lower left corner, on a light ground."""
+    """Write lines of text in the lower left corner on a light background."""
     draw, font = ImageDraw.Draw(picture, "RGBA"), _font(picture.height)
     step, margin = 1.35 * font.size, 0.5 * font.size
     wide = max(draw.textlength(line, font) for line in lines)
@@ -179,5 +181,5 @@ def _write(picture: Image.Image, lines: Sequence[str]) -> None:
 
 @functools.lru_cache(maxsize=8)
 def _font(height: int) -> Any:
-    """A font for pictures of a height."""
+    """Return a font for frames of a given height (pixels)."""
     return ImageFont.load_default(max(9.0, height / 30))

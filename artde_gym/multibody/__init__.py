@@ -1,1 +1,1 @@
-"""Robots as data, the rigid-body algebra over them, and the model files that physics engines read."""
+"""Robots as data, their rigid-body dynamics, and model files for physics engines."""

@@ -1,4 +1,4 @@
-"""Rigid-body algebra of a `RobotSpec` in plain NumPy, batched over leading axes.
+"""Rigid-body dynamics of a `RobotSpec` in NumPy, batched over leading axes.
 
 A floating-base tree with generalized velocity v = [v_base; w_base; qd], all base quantities in world axes at the base
 link's origin:
@@ -10,9 +10,9 @@ Every sum runs over the moving links b with Jacobians J_v,b of the center of mas
     M   = sum_b  m_b J_v^T J_v + J_w^T I_b J_w
     tau = sum_b  J_v^T m_b (a_b + g z) + J_w^T (I_b alpha_b + w_b x I_b w_b)
 
-the second one as Newton-Euler sums over what each joint carries. Rotor links follow their gear, so that `n` counts
-independent joints only. Source: Featherstone, Rigid Body Dynamics Algorithms (2008), chapters 2 and 5; the form with
-explicit Jacobians is Siciliano et al., Robotics (2009), section 7.2.
+the second one as Newton-Euler sums over the links that each joint carries. Rotor links follow their gear, so that `n`
+counts only independent joints. Source: Featherstone, Rigid Body Dynamics Algorithms (2008), chapters 2 and 5; the form
+with explicit Jacobians is Siciliano et al., Robotics (2009), section 7.2.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ GRAVITY = 9.81  # m/s^2
 
 
 class Frames(NamedTuple):
-    """Where the moving links are, in world axes with the base origin at zero.
+    """Frames of the moving links, in world axes with the base origin at zero.
 
-    `rot` (..., b, 3, 3) turns link coordinates into world ones, `origin` and `com` are (..., b, 3), `axis`
+    `rot` (..., b, 3, 3) maps link coordinates to world ones, `origin` and `com` are (..., b, 3), `axis`
     (..., b - 1, 3) holds the joint axes of all links but the base.
     """
 
@@ -77,7 +77,7 @@ class RigidBodyTree:
         return len(self.joints)
 
     def frames(self, q: Array, rot_base_to_world: Array | None = None) -> Frames:
-        """Forward kinematics of joint angles `q` (..., n) (rad)."""
+        """Compute forward kinematics of joint angles `q` (..., n) (rad)."""
         angles = q @ self._transmission.T
         bodies = len(self._mass)
         rot = np.empty((*q.shape[:-1], bodies, 3, 3))
@@ -93,12 +93,12 @@ class RigidBodyTree:
         return Frames(rot, origin, com, axis)
 
     def center_of_mass(self, q: Array, rot_base_to_world: Array | None = None) -> Array:
-        """Whole-body center of mass relative to the base origin, (..., 3) (m)."""
+        """Return the whole-body center of mass relative to the base origin, (..., 3) (m)."""
         com = self.frames(q, rot_base_to_world).com
         return np.einsum("b,...bi->...i", self._mass, com) / self.mass
 
     def mass_matrix(self, q: Array, rot_base_to_world: Array | None = None) -> Array:
-        """M(q), (..., 6 + n, 6 + n)."""
+        """Return M(q), (..., 6 + n, 6 + n)."""
         frames = self.frames(q, rot_base_to_world)
         linear, angular = self._jacobians(frames, frames.com, self._supports)
         inertia = frames.rot @ self._inertia @ np.swapaxes(frames.rot, -1, -2)
@@ -117,10 +117,10 @@ class RigidBodyTree:
         base_acceleration: Array | None = None,
         rot_base_to_world: Array | None = None,
     ) -> Array:
-        """Generalized force that produces a motion, (..., 6 + n): [force, moment on the base; joint torques].
+        """Return the generalized force of a motion, (..., 6 + n): [force, moment on the base; joint torques].
 
-        `base_velocity` and `base_acceleration` are (..., 6), [linear; angular], the linear acceleration being that of
-        the base origin (not the spatial one). Zero where left out.
+        `base_velocity` and `base_acceleration` are (..., 6), [linear; angular], zero by default; the linear
+        acceleration is that of the base origin (not the spatial one).
         """
         frames = self.frames(q, rot_base_to_world)
         omega, alpha, accel = self._accelerations(frames, qd, qdd, base_velocity, base_acceleration)
@@ -131,7 +131,7 @@ class RigidBodyTree:
         inertia = frames.rot @ self._inertia @ np.swapaxes(frames.rot, -1, -2)
         moment = (inertia @ alpha[..., None])[..., 0] + _cross(omega, (inertia @ omega[..., None])[..., 0])
         moment += _cross(frames.com, force)  # about the base origin
-        # what each joint carries: the sum over the links that it moves
+        # the load of each joint: the sum over the links that it moves
         force_carried = np.einsum("bj,...bi->...ji", self._supports, force)
         moment_carried = np.einsum("bj,...bi->...ji", self._supports, moment)
         moment_carried -= _cross(frames.origin[..., 1:, :], force_carried)
@@ -139,7 +139,7 @@ class RigidBodyTree:
         return np.concatenate([force.sum(axis=-2), moment.sum(axis=-2), torque + self._armature * qdd], axis=-1)
 
     def jacobian(self, link: str, q: Array, rot_base_to_world: Array | None = None) -> Array:
-        """J (..., 6, 6 + n) of the velocity [linear; angular] of the origin of `link`."""
+        """Return J (..., 6, 6 + n) of the velocity [linear; angular] of the origin of `link`."""
         frames = self.frames(q, rot_base_to_world)
         body = self._body(link)
         linear, angular = self._jacobians(frames, frames.origin[..., [body], :], self._supports[[body]])
@@ -148,18 +148,18 @@ class RigidBodyTree:
     def bias_acceleration(
         self, link: str, q: Array, qd: Array, base_velocity: Array, rot_base_to_world: Array | None = None
     ) -> Array:
-        """dJ/dt v, (..., 6): the acceleration of the origin of `link` while all of dv/dt is zero."""
+        """Return dJ/dt v, (..., 6): the acceleration of the origin of `link` for dv/dt = 0."""
         frames = self.frames(q, rot_base_to_world)
         _, alpha, accel = self._accelerations(frames, qd, np.zeros_like(qd), base_velocity, None)
         body = self._body(link)
         return np.concatenate([accel[..., body, :], alpha[..., body, :]], axis=-1)
 
     def position(self, link: str, q: Array, rot_base_to_world: Array | None = None) -> Array:
-        """Origin of `link` relative to the base origin, (..., 3) (m)."""
+        """Return the origin of `link` relative to the base origin, (..., 3) (m)."""
         return self.frames(q, rot_base_to_world).origin[..., self._body(link), :]
 
     def rotation(self, link: str, q: Array) -> Array:
-        """Orientation of `link` in base axes, (..., 3, 3)."""
+        """Return the orientation of `link` in base axes, (..., 3, 3)."""
         return self.frames(q).rot[..., self._body(link), :, :]
 
     @property
@@ -176,7 +176,7 @@ class RigidBodyTree:
         return self._index[link]
 
     def _jacobians(self, frames: Frames, point: Array, supports: Array) -> tuple[Array, Array]:
-        """Linear and angular Jacobian of one `point` (..., b, 3) on each of the links with `supports` (b, joints)."""
+        """Return linear and angular Jacobians of a `point` (..., b, 3) on each link with `supports` (b, joints)."""
         shape = (*point.shape[:-1], 3, 6 + supports.shape[1])
         linear, angular = np.zeros(shape), np.zeros(shape)
         linear[..., :3] = angular[..., 3:6] = np.eye(3)
@@ -190,7 +190,7 @@ class RigidBodyTree:
     def _accelerations(
         self, frames: Frames, qd: Array, qdd: Array, base_velocity: Array | None, base_acceleration: Array | None
     ) -> tuple[Array, Array, Array]:
-        """Angular velocity, angular acceleration and acceleration of the origin of each link, (..., b, 3)."""
+        """Return angular velocity, angular acceleration and acceleration of the origin of each link, (..., b, 3)."""
         rate, rate_dot = qd @ self._transmission.T, qdd @ self._transmission.T
         omega, alpha, accel = (np.zeros_like(frames.com) for _ in range(3))
         if base_velocity is not None:
@@ -208,7 +208,7 @@ class RigidBodyTree:
 
 
 def joint_space_inertia(mass_matrix: Array) -> Array:
-    """Inertia that the joints of a free-floating robot feel: the Schur complement of M over its base.
+    """Return the effective joint inertia of a free-floating robot: the Schur complement of M over its base.
 
     M_jj - M_jb M_bb^-1 M_bj, (..., n, n); its inverse is the joint block of M^-1, so that qdd = inertia^-1 tau + ....
     """
@@ -217,14 +217,14 @@ def joint_space_inertia(mass_matrix: Array) -> Array:
 
 
 def _rotations(axis: Array, angle: Array) -> Array:
-    """Rodrigues: R = 1 + sin(a) [axis]x + (1 - cos(a)) [axis]x^2, (..., j, 3, 3)."""
+    """Return Rodrigues' R = 1 + sin(a) [axis]x + (1 - cos(a)) [axis]x^2, (..., j, 3, 3)."""
     cross = _skew(axis)
     sine, cosine = np.sin(angle)[..., None, None], np.cos(angle)[..., None, None]
     return np.eye(3) + sine * cross + (1 - cosine) * (cross @ cross)
 
 
 def _skew(v: Array) -> Array:
-    """[v]x, with [v]x u = v x u."""
+    """Return [v]x, with [v]x u = v x u."""
     out = np.zeros((*v.shape, 3))
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
     out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
@@ -232,7 +232,7 @@ def _skew(v: Array) -> Array:
 
 
 def _cross(a: Array, b: Array) -> Array:
-    """a x b; np.cross does the same, several times slower on short vectors."""
+    """Return a x b, several times faster than np.cross on short vectors."""
     out = np.empty(np.broadcast_shapes(a.shape, b.shape))
     out[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
     out[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]

@@ -1,4 +1,4 @@
-"""First-order lag, exactly discretised."""
+"""First-order lag, discretized exactly."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Number = TypeVar("Number", float, Array)
 
 
 def lag_shares(time_constant: float, duration: float) -> tuple[float, float]:
-    """The shares of the gap to a constant target that are closed after `duration` (s), and on average until then.
+    """Return the share of the gap to a constant target that is closed after `duration` (s), and its mean until then.
 
     x(t) = target - (target - x_0) exp(-t / T); both are 1 without a lag, T = 0.
     """
@@ -22,6 +22,6 @@ def lag_shares(time_constant: float, duration: float) -> tuple[float, float]:
 
 
 def follow(value: Number, target: Number, end: float | Number, mean: float | Number) -> tuple[Number, Number]:
-    """Value at the end and mean value of an interval that closes the shares `end` and `mean`; elementwise."""
+    """Return the final and the mean value of an interval with the shares `end` and `mean`; elementwise."""
     gap = target - value
     return value + end * gap, value + mean * gap

@@ -1,10 +1,9 @@
-"""MJCF text from a `RobotSpec`: the robot on level ground, as MuJoCo simulates it.
+"""MJCF text from a `RobotSpec`: the robot on level ground for MuJoCo.
 
-Unlike URDF the format holds a whole world, so that ground, contacts and solver are written here too. Contacts are
-listed pair by pair: a pair's friction is its own, and is not combined from those of its two shapes. MuJoCo softens a
-contact: it pushes back as a critically damped spring of time constant `CONTACT_TIME` whose impedance rises from .9 to
-.95 over the first millimeter of depth; an elliptic cone with `impratio` 10 lets friction slip ten times less than the
-normal direction yields.
+Unlike URDF the format describes a whole world, so that ground, contacts and solver are included. Contacts are listed as
+pairs, each with its own friction, which is not combined from those of its two shapes. MuJoCo's contacts are soft:
+critically damped springs of time constant `CONTACT_TIME` whose impedance rises from .9 to .95 over the first millimeter
+of depth; with an elliptic cone and `impratio` 10, friction slips ten times less than the normal direction yields.
 """
 
 from __future__ import annotations
@@ -16,13 +15,13 @@ from artde_gym.multibody.urdf import numbers
 
 GROUND = "ground"
 PAYLOAD = "payload"
-"""A body without mass, fixed to the base, that an engine may give the payload's mass and place."""
+"""A massless body fixed to the base, to which an engine can assign the payload's mass and position."""
 CONTACT_TIME = 0.005  # s; about as stiff as Bullet's contacts, which correct a fifth of the depth each millisecond
 IMPEDANCE = (0.9, 0.95, 0.001)
-MEMORY = "1M"
-"""Of contacts and constraints: thirty times what both feet on the ground use; by itself MuJoCo sets 14 MB aside."""
+ARENA_MEMORY = "1M"
+"""Memory for contacts and constraints: thirty times the need of both feet on the ground; MuJoCo's default is 14 MB."""
 
-# as Bullet's renderer has it, so that pictures of both engines look the same
+# the light of Bullet's renderer, so that images of both engines look alike
 _SUN = {
     "directional": "true",
     "dir": "-1 -1.5 -3",
@@ -33,15 +32,15 @@ _SUN = {
 
 
 def mjcf(spec: RobotSpec) -> str:
-    """The robot as MJCF, its base free; joint and body names are those of the links."""
+    """Return the robot as MJCF with a free base; joints and bodies have the names of the links."""
     root = ET.Element("mujoco", model=spec.name)
     ET.SubElement(root, "compiler", angle="radian", inertiafromgeom="false", alignfree="false")
-    # dense, as `auto` chooses at this size too: MuJoCo 4.0.0 factorises sparse Hessians wrongly (its issue 3767)
+    # dense, as `auto` chooses at this size too: MuJoCo 4.0.0 factorizes sparse Hessians wrongly (its issue 3767)
     solver = {"integrator": "implicitfast", "solver": "Newton", "jacobian": "dense", "cone": "elliptic"}
     option = ET.SubElement(root, "option", solver, impratio="10")
-    # a state that diverges must not jump back to the start; one robot needs no search for independent islands
+    # no automatic reset of a diverging state; no search for independent islands, which one robot does not have
     ET.SubElement(option, "flag", autoreset="disable", island="disable")
-    ET.SubElement(root, "size", memory=MEMORY)
+    ET.SubElement(root, "size", memory=ARENA_MEMORY)
     default = ET.SubElement(root, "default")
     ET.SubElement(default, "geom", contype="0", conaffinity="0")
     soft = {"solref": numbers((CONTACT_TIME, 1.0)), "solimp": numbers(IMPEDANCE)}

@@ -1,7 +1,7 @@
-"""An engine-neutral description of a robot: links, joints, gears and actuators.
+"""Engine-neutral description of a robot: links, joints, gears and actuators.
 
-URDF (Bullet), the rigid-body algebra of `artde_gym.multibody.dynamics` and every other engine's
-model are made from this one description, so that they cannot disagree.
+URDF (Bullet), the rigid-body dynamics of `artde_gym.multibody.dynamics` and the models of other engines are generated
+from this description, so that they agree.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Vector = tuple[float, float, float]
 Color = tuple[float, float, float, float]
 
 ROTOR_MASS = 1e-6
-"""Mass (kg) of a rotor link: engines need one above zero; its parent link gives it away."""
+"""Mass (kg) of a rotor link, subtracted from its parent link's: engines require one above zero."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,13 +38,13 @@ class Link:
         mass: kg, above zero.
         com: center of mass in the link frame (m).
         inertia: principal moments about the center of mass, along the link's axes (kg m^2); they
-            must satisfy the triangle inequality, since engines drop the whole tensor otherwise.
+            must satisfy the triangle inequality, or engines discard the whole tensor.
         parent: name of the parent link; None for the base.
-        origin: of the joint, in the parent link's frame (m). At the zero position all link frames
+        origin: origin of the joint in the parent link's frame (m). At the zero position all link frames
             have the same orientation.
         axis: rotation axis in the link frame (unit vector along x, y or z); None for a fixed joint.
         limits: lowest and highest joint angle (rad).
-        visuals, collisions: shapes to be seen, and shapes that touch the ground.
+        visuals, collisions: visible shapes, and shapes that collide with the ground.
     """
 
     name: str
@@ -63,13 +63,13 @@ class Link:
             raise RobotError(f"mass of link {self.name!r}", self.mass, "a finite number > 0 kg")
         smallest, middle, largest = sorted(self.inertia)
         if not (smallest > 0 and smallest + middle >= largest and math.isfinite(largest)):
-            allowed = "three moments > 0 kg m^2 of which no two add up to less than the third"
+            allowed = "three moments > 0 kg m^2 that satisfy the triangle inequality"
             raise RobotError(f"inertia of link {self.name!r}", self.inertia, allowed)
 
 
 @dataclasses.dataclass(frozen=True)
 class Gear:
-    """`rotor` turns `ratio` times as fast as `driven`; both links hang on the same parent."""
+    """A gear: `rotor` turns `ratio` times as fast as `driven`; both links have the same parent."""
 
     rotor: str
     driven: str
@@ -81,15 +81,15 @@ class RobotSpec:
     """A tree of links, parents before children; the first one is the floating base.
 
     Attributes:
-        actuated: the driven joints (named by the link that they carry), in the order of actions.
-        armature: rotor inertia reflected to each actuated joint through its gear (kg m^2), as far as no link of the
-            tree carries it already; M grows by diag(armature).
-        gear_ratio: turns of a rotor for one turn of its joint.
-        torque_limit: of every actuated joint (Nm).
+        actuated: the actuated joints (named by the link that they carry), in the order of actions.
+        armature: rotor inertia reflected to each actuated joint through its gear (kg m^2), unless rotors are links;
+            it adds diag(armature) to M.
+        gear_ratio: turns of a rotor per turn of its joint.
+        torque_limit: limit of every actuated joint (Nm).
         gears: couplings between rotor links and driven links.
-        feet: links that carry the robot, left then right.
-        sites: named points to push at or to load, as (link, position in the link frame).
-        feet_collide: whether the feet stop each other, or pass through each other.
+        feet: links that support the robot, left then right.
+        sites: points for pushes and loads, as (name, link, position in the link frame).
+        feet_collide: True if the feet collide with each other.
     """
 
     name: str
@@ -113,11 +113,11 @@ class RobotSpec:
 
     @property
     def joints(self) -> tuple[Link, ...]:
-        """The links with a revolute joint, in the order of the tree."""
+        """Links with a revolute joint, in the order of the tree."""
         return tuple(link for link in self.links if link.axis is not None)
 
     def sole(self, foot: str) -> Vector:
-        """Middle of the underside of a foot's collision box, in its link frame (m)."""
+        """Return the center of the bottom face of a foot's collision box, in its link frame (m)."""
         box = self.by_name[foot].collisions[0]
         return (box.center[0], box.center[1], box.center[2] - box.size[2] / 2)
 
@@ -128,7 +128,7 @@ class RobotSpec:
 
     @property
     def height(self) -> float:
-        """Distance between the lowest and the highest visible point at the zero position (m)."""
+        """Distance between the lowest and highest visible points at the zero position (m)."""
         origins: dict[str, np.ndarray] = {}
         low, high = math.inf, -math.inf
         for link in self.links:
@@ -139,7 +139,7 @@ class RobotSpec:
         return high - low
 
     def merged(self) -> RobotSpec:
-        """The same robot with links on fixed joints made one with the links that carry them: fewer to simulate.
+        """Merge links on fixed joints into their parents, so that there are fewer to simulate.
 
         Raises:
             RobotError: if a merged link's principal axes no longer lie along its frame.
@@ -170,11 +170,12 @@ class RobotSpec:
         return dataclasses.replace(self, links=tuple(links), sites=sites)
 
     def with_rotor_links(self) -> RobotSpec:
-        """The same robot with its armature as real rotors, for engines that know no armature.
+        """Replace the armature by rotor links, for engines without armature.
 
-        Each actuated joint gets a rotor on the joint's *parent* link with inertia a / r^2 about the joint axis; turning
-        r = `gear_ratio` times as fast it reflects exactly a. The transverse moments are 0.51 of the axial one: half
-        would be a thin disc, at the very edge of the triangle inequality, where rounding makes engines drop the tensor.
+        Each actuated joint gets a rotor on the joint's *parent* link with inertia a / r^2 about the joint axis, which
+        turns r = `gear_ratio` times as fast, so that exactly a is reflected. The transverse moments are 0.51 of the
+        axial one: at 0.5, a thin disc, rounding could violate the triangle inequality and engines would discard the
+        tensor.
         """
         links = list(self.links)
         gears = []
@@ -201,9 +202,9 @@ class RobotSpec:
         return dataclasses.replace(self, links=tuple(links), gears=tuple(gears), armature=(0.0,) * len(self.actuated))
 
     def with_lumped_armature(self, armature: tuple[float, ...], base: float) -> RobotSpec:
-        """The same robot with discs of inertia (a, a/2, a/2) about the joint axis on the child links.
+        """Replace the armature by discs of inertia (a, a/2, a/2) about the joint axis on the child links.
 
-        Cheaper for an engine than rotors, and not the same: a disc moves with the child link.
+        This is faster to simulate than rotors, but not equivalent: a disc moves with the child link.
         `base` (kg m^2) is added to each of the base link's moments.
         """
         extra = dict(zip(self.actuated, armature, strict=True))
@@ -229,7 +230,7 @@ def box_link(
     *,
     collides: bool = False,
 ) -> Link:
-    """A link that is a homogeneous box: I_x = m (b^2 + c^2) / 12 and so on."""
+    """Return a link that is a homogeneous box: I_x = m (b^2 + c^2) / 12 and so on."""
     a, b, c = size
     inertia = (mass / 12 * (b * b + c * c), mass / 12 * (a * a + c * c), mass / 12 * (a * a + b * b))
     shape = (Box(size, center),)
@@ -237,7 +238,7 @@ def box_link(
 
 
 def _merge(carrier: Link, group: list[tuple[Link, np.ndarray]]) -> Link:
-    """`carrier` with the mass, inertia (parallel axes) and shapes of all links of `group`, each at its offset."""
+    """Return `carrier` with the mass, inertia (parallel axes) and shapes of all links of `group` at their offsets."""
     mass = math.fsum(link.mass for link, _ in group)
     com = np.sum([link.mass * (np.asarray(link.com) + offset) for link, offset in group], axis=0) / mass
     inertia = np.zeros((3, 3))
@@ -269,6 +270,6 @@ def _vector(values: np.ndarray) -> Vector:
 
 
 def _about_axis(axis: Vector, *, axial: float, transverse: float) -> Vector:
-    """Principal moments of a body of revolution about `axis`, one of the coordinate axes."""
+    """Return principal moments of a body of revolution about `axis`, one of the coordinate axes."""
     x, y, z = (axial if component else transverse for component in axis)
     return (x, y, z)

@@ -1,10 +1,10 @@
-"""Joint torques of a walking robot from its motion, without measuring the ground's forces.
+"""Joint torques of a walking robot from its motion, without measured ground forces.
 
-A foot that stands level and still makes the base move as the joints say, v_base = -J_base^-1 J_joints qd. Inverse
-dynamics of that motion gives the wrench (F, N) which the ground has to supply; in single support it is all on one foot.
-In double support its split is not unique: we let foot i carry the share w_i of the force, through the middle c_i of
-its sole, and the share w_i of what moment is left about c = sum_i w_i c_i. Then no inner tension arises, and a body in
-balance over c leaves no moment at all.
+A foot that rests level on the ground determines the base's velocity, v_base = -J_base^-1 J_joints qd. Inverse dynamics
+of that motion gives the wrench (F, N) of the ground; in single support it acts on one foot. In double support its
+distribution is not unique: foot i carries the share w_i of the force, at the center c_i of its sole, and the share w_i
+of the remaining moment about c = sum_i w_i c_i. Then the feet do not work against each other, and a body balanced over
+c leaves no moment.
 
     tau = ID_joints - sum_i J_i^T [w_i F; w_i (N - c x F) about c_i]
 """
@@ -19,7 +19,7 @@ from artde_gym.multibody.spec import RobotSpec
 
 
 class Supported:
-    """Inverse dynamics of a robot on its feet: `torque` is the whole interface."""
+    """Inverse dynamics of a robot on its feet; see `torque`."""
 
     def __init__(self, spec: RobotSpec) -> None:
         self._tree = RigidBodyTree(spec)
@@ -27,10 +27,10 @@ class Supported:
         self._soles = [np.asarray(spec.sole(foot)) for foot in spec.feet]
 
     def torque(self, load_left: float | Array, q: Array, qd: Array, qdd: Array) -> Array:
-        """Joint torques (..., n) (Nm) of the motion q, qd, qdd (..., n).
+        """Return the joint torques (..., n) (Nm) of the motion q, qd, qdd (..., n).
 
         Args:
-            load_left: share of the weight on the left foot, the first one (...), 0 to 1.
+            load_left: share of the weight on the left (first) foot (...), 0 to 1.
         """
         tree, left = self._tree, np.asarray(load_left, dtype=np.float64)[..., None]
         rotations = [tree.rotation(foot, q) for foot in self._feet]

@@ -1,4 +1,4 @@
-"""URDF text from a `RobotSpec`; numbers are written with 17 digits, so that nothing is lost on the way."""
+"""URDF text from a `RobotSpec`; numbers have 17 digits, so that no precision is lost."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from artde_gym.multibody.spec import Box, Link, RobotSpec
 
 
 def urdf(spec: RobotSpec) -> str:
-    """The robot as URDF. Gears have no place in the format: the engine couples them itself."""
+    """Return the robot as URDF. The format has no gears; the engine adds them."""
     root = ET.Element("robot", name=spec.name)
     for link in spec.links:
         root.append(_link(link))
@@ -57,5 +57,5 @@ def _joint(link: Link, effort: float) -> ET.Element:
 
 
 def numbers(values: Iterable[float]) -> str:
-    """Numbers as an XML attribute, with all their digits."""
+    """Return numbers as an XML attribute, with all their digits."""
     return " ".join(f"{value:.17g}" for value in values)

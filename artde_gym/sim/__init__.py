@@ -1,1 +1,1 @@
-"""Physics engines behind one protocol; the only package that imports one."""
+"""Physics engines behind one protocol; only this package imports them."""

@@ -1,10 +1,10 @@
-"""The engine protocol on PyBullet.
+"""PyBullet as an `Engine`.
 
-Bullet's habits that stay in here: it knows no armature, so that rotors become links with gears; the base is read and
-set by its center-of-mass frame; torque control holds for one step; motors are on until told otherwise; joint speeds are
-clamped at 100 rad/s by default; friction of a pair is the product of both bodies'; the solver stops early at a residual
-that leaves 1 % errors in geared joints; every call needs the client's number, or a second simulation in the process
-corrupts the first.
+Bullet's peculiarities are handled here: it has no armature, so that rotors become links with gears; the base is read
+and set by its center-of-mass frame; torques last one step; joint motors are on by default; joint speeds are clamped at
+100 rad/s by default; friction of a pair is the product of both bodies' coefficients; the solver stops early at a
+residual that leaves 1 % errors in geared joints; every call needs the client's id, or a second simulation in the
+process corrupts the first.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from artde_gym.sim.ground import SUN, Shadow, paint
 from artde_gym.sim.pybullet_module import bullet
 from artde_gym.sim.rotation import Quaternion, point_velocity, rotate
 
-GEAR_ITERATIONS = 60  # of the solver; with 30, what is left over in the gears raises ARTDE's RMSE in S1 by a third
-BARE_ITERATIONS = 50  # without gears
+GEAR_ITERATIONS = 60  # of the solver; with 30, the gears' residual raises ARTDE's RMSE in S1 by a third
+BARE_ITERATIONS = 50  # of the solver without gears
 GEAR_FORCE = 1e6  # N, more than any gear carries
-PAYLOAD_FORCE = 1e5  # N, likewise
-FAR = 30.0  # m, behind which nothing is drawn
-CONTACT_SHARE = 0.08  # of a foot's depth in the ground that is corrected each time step, Bullet's own
-HOLD_TORQUE = 100.0  # Nm, of the motors that hold joints which nobody actuates
+PAYLOAD_FORCE = 1e5  # N, more than any payload's constraint carries
+FAR_PLANE = 30.0  # m, from the camera
+CONTACT_SHARE = 0.08  # of a foot's penetration depth corrected per time step, Bullet's default
+HOLD_TORQUE = 100.0  # Nm, of the motors that hold unactuated joints
 
 _ORIGIN = (0.0, 0.0, 0.0)
 _NO_JOINTS = np.zeros(0)
@@ -45,7 +45,7 @@ _NO_JOINTS.flags.writeable = False
 
 
 class _Snapshot(NamedTuple):
-    """A state of the world by Bullet's handle, the friction of its contacts, and the same for another process."""
+    """A saved state: Bullet's handle, the friction of contacts, and the world as bytes for other processes."""
 
     handle: int
     friction: float
@@ -53,7 +53,7 @@ class _Snapshot(NamedTuple):
 
 
 class BulletEngine:
-    """One robot on a plane in a Bullet world of its own; it draws everywhere, whatever `renders` says."""
+    """One robot on a plane in its own Bullet world; it can always render, whatever `renders` is."""
 
     name = "bullet"
 
@@ -62,7 +62,9 @@ class BulletEngine:
         self.time_step = time_step
         self._client = bullet.connect(bullet.DIRECT)
         if self._client < 0:
-            raise RuntimeError("PyBullet gave no physics client: too many are open in this process")
+            raise RuntimeError(
+                "PyBullet has no free physics client: too many are open in this process; close environments"
+            )
         self._finalizer = weakref.finalize(self, _disconnect, self._client)
         bullet.setTimeStep(time_step, physicsClientId=self._client)
         bullet.setGravity(0.0, 0.0, -9.81, physicsClientId=self._client)
@@ -75,7 +77,7 @@ class BulletEngine:
         )
         self._ground = self._build_ground()
         self._robot = self._build_robot()
-        self._ball = bullet.createVisualShape(  # of the payload, once: Bullet never frees a visual shape
+        self._ball = bullet.createVisualShape(  # shape of the payload, made once: Bullet never frees a visual shape
             bullet.GEOM_MESH,
             fileName=str(Path(pybullet_data.getDataPath()) / "sphere_smooth.obj"),  # of radius 1
             meshScale=[PAYLOAD_LOOK] * 3,
@@ -91,7 +93,7 @@ class BulletEngine:
         self._friction = math.nan
         self._gravity: Vector = (0.0, 0.0, -9.81)
         self._snapshots: list[_Snapshot] = []
-        self._ballast: tuple[float, Vector] = (0.0, _ORIGIN)  # mass and place of the payload
+        self._ballast: tuple[float, Vector] = (0.0, _ORIGIN)  # mass and position of the payload
         self._payload: int | None = None  # body
         self._holder: int | None = None  # constraint
 
@@ -171,7 +173,7 @@ class BulletEngine:
         bullet.restoreState(saved.handle, physicsClientId=self._client)
 
     def __getstate__(self) -> dict[str, Any]:
-        """All that a copy needs: an equal world in a client of its own, which steps as this one would, bit for bit."""
+        """Return the state of a copy: a world in its own client that steps bitwise like this one."""
         payload = None if self._payload is None else (*self._ballast, self._holder is not None)
         return {
             "built": (self.spec, self.time_step),
@@ -198,14 +200,14 @@ class BulletEngine:
         self._load(friction, state["world"])
 
     def _world(self) -> bytes:
-        """Positions, velocities and contacts of all bodies, as Bullet writes them to files."""
+        """Return positions, velocities and contacts of all bodies in Bullet's file format."""
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "world.bullet"
             bullet.saveBullet(str(file), physicsClientId=self._client)
             return file.read_bytes()
 
     def _load(self, friction: float, world: bytes) -> None:
-        """Bring about what `_world` wrote, in a world with the same bodies."""
+        """Load the output of `_world` in a world with the same bodies."""
         if not math.isnan(friction):
             self._set_foot_friction(friction)
         with tempfile.TemporaryDirectory() as folder:
@@ -262,7 +264,7 @@ class BulletEngine:
         return x, y, z
 
     def _site(self, name: str) -> tuple[str, Vector]:
-        """A site's link and place on it."""
+        """Return a site's link and its position on it."""
         if name not in self._sites:
             raise RobotError("site", name, ", ".join(map(repr, self._sites)))
         return self._sites[name]
@@ -306,7 +308,7 @@ class BulletEngine:
                 self._robot,
                 self._links[link.name],
                 mass=own * link.mass,
-                localInertiaDiagonal=[turning * moment for moment in link.inertia],  # or Bullet makes up its own
+                localInertiaDiagonal=[turning * moment for moment in link.inertia],  # otherwise Bullet computes its own
                 physicsClientId=self._client,
             )
         self._scales = scales
@@ -315,7 +317,7 @@ class BulletEngine:
         if coefficient == self._friction:
             return
         self._set_foot_friction(coefficient)
-        # a contact point keeps the coefficient that it was born with: lift the robot for a moment, so that all are new
+        # a contact point keeps the coefficient of its creation: lift the robot briefly, so that all are new
         client: dict[str, Any] = {"physicsClientId": self._client}
         center, quat = bullet.getBasePositionAndOrientation(self._robot, **client)
         velocity, spin = bullet.getBaseVelocity(self._robot, **client)
@@ -335,7 +337,9 @@ class BulletEngine:
         center, quat = bullet.getBasePositionAndOrientation(self._robot, **client)
         offset = np.subtract(position, self._com)
         point = np.asarray(center) + _rotation(quat) @ offset
-        body = bullet.createMultiBody(mass, -1, -1, point.tolist(), quat, **client)  # its ball is in pictures only
+        body = bullet.createMultiBody(
+            mass, -1, -1, point.tolist(), quat, **client
+        )  # its ball exists only in rendered images
         moment = 0.4 * mass * PAYLOAD_RADIUS**2
         bullet.changeDynamics(
             body, -1, localInertiaDiagonal=[moment] * 3, linearDamping=0.0, angularDamping=0.0, **client
@@ -369,9 +373,9 @@ class BulletEngine:
         view = bullet.computeViewMatrixFromYawPitchRoll(
             camera.target, camera.distance, camera.yaw_deg, -camera.pitch_deg, 0.0, 2
         )
-        lens = bullet.computeProjectionMatrixFOV(FIELD_OF_VIEW, camera.width / camera.height, NEAR, FAR)
+        lens = bullet.computeProjectionMatrixFOV(FIELD_OF_VIEW, camera.width / camera.height, NEAR, FAR_PLANE)
         payload, ball = self.payload_position(), None
-        if payload is not None:  # for this picture alone: to read the mesh of its ball takes longer than a reset
+        if payload is not None:  # only now: reading the mesh of its ball takes longer than a reset
             ball = bullet.createMultiBody(0.0, -1, self._ball, payload, physicsClientId=self._client)
         _, _, rgba, _, body = bullet.getCameraImage(
             camera.width,

@@ -1,4 +1,4 @@
-"""A window of Bullet's own: it shows a robot that is simulated elsewhere, and says what a person does in it."""
+"""Bullet's window: shows a robot that is simulated elsewhere and reads keys and clicks."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from artde_gym.sim.ground import SUN
 from artde_gym.sim.pybullet_module import bullet
 from artde_gym.sim.rotation import rotate
 
-PATIENCE = 60.0  # s, for a first window to open
-NEAR_CLICK = 60.0  # pixels, that a click may be off what it is meant for
+PATIENCE = 60.0  # s, timeout for the first window
+CLICK_RADIUS = 60.0  # pixels, largest distance of a click from its target
 INK, RED = (0.1, 0.12, 0.14), (0.77, 0.09, 0.24)
-ABOVE = 0.55  # m, of the words above what the camera looks at
-LIGHT = 3.0  # of the sun's vector, to the lamp
-LASTING = 0.4  # s, that an arrow stays
-_AWAY: Vector = (0.0, 0.0, -10.0)  # under the ground
-_LINE = 0.09  # m, from one line of words to the next
+TEXT_HEIGHT = 0.55  # m, height of the text above the camera's target
+LIGHT_DISTANCE = 3.0  # multiple of the sun's vector at which the lamp is
+ARROW_LIFETIME = 0.4  # s
+_HIDDEN_POSITION: Vector = (0.0, 0.0, -10.0)  # m, below the ground
+_LINE_SPACING = 0.09  # m, of the text
 
 _KEYS = {
     bullet.B3G_LEFT_ARROW: "left",
@@ -43,33 +43,33 @@ _PROBE = "import pybullet; pybullet.disconnect(pybullet.connect(pybullet.GUI))"
 
 
 def require_window() -> None:
-    """See that a window can be opened; Bullet would end the whole process where it cannot.
+    """Check that a window can be opened; otherwise Bullet would end the process.
 
     Raises:
-        OptionError: without a display, or without OpenGL on it.
+        OptionError: without a display with OpenGL.
     """
     where = os.environ.get("DISPLAY")
     if not where:
         raise OptionError(
-            "display", None, "one that shows OpenGL 3 (DISPLAY is not set here); `artde-gym video` needs none"
+            "display", None, "a display with OpenGL 3 (DISPLAY is not set); `artde-gym video` works without one"
         )
     try:
         done = subprocess.run([sys.executable, "-c", _PROBE], capture_output=True, text=True, timeout=PATIENCE)
     except subprocess.TimeoutExpired as error:
-        raise OptionError("display", where, f"one on which a window opens within {PATIENCE:g} s") from error
+        raise OptionError("display", where, f"a display on which a window opens within {PATIENCE:g} s") from error
     if done.returncode:
         said = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
         why = said[-1].strip() if said else f"exit code {done.returncode}"
-        raise OptionError("display", where, f"one that shows OpenGL 3 (here: {why}); `artde-gym video` needs none")
+        raise OptionError("display", where, f"a display with OpenGL 3 ({why}); `artde-gym video` works without one")
 
 
 class BulletWindow:
-    """A window onto the world of an engine, whichever it is: it shows what `show` says, and simulates nothing.
+    """A window that displays the robot of any engine; it simulates nothing.
 
     Open it before the first engine of a process: Bullet's window stays black beside an older client. Then `load`.
 
     Raises:
-        OptionError: without a display, or without OpenGL on it.
+        OptionError: without a display with OpenGL.
     """
 
     def __init__(self) -> None:
@@ -88,7 +88,7 @@ class BulletWindow:
             bullet.configureDebugVisualizer(flag, 0, **self._client)
 
     def load(self, spec: RobotSpec) -> None:
-        """Build ground, payload and robot, and begin to draw."""
+        """Build ground, payload and robot, and start drawing."""
         self._spec = spec
         data = Path(pybullet_data.getDataPath())
         ground = self._body(bullet.GEOM_MESH, fileName=str(data / "plane100.obj"))
@@ -102,46 +102,48 @@ class BulletWindow:
         joints = range(bullet.getNumJoints(self._robot, **self._client))
         links = {bullet.getJointInfo(self._robot, i, **self._client)[12].decode(): i for i in joints}
         self._joints = [links[name] for name in spec.actuated]
-        light = [LIGHT * part for part in SUN]
+        light = [LIGHT_DISTANCE * part for part in SUN]
         bullet.configureDebugVisualizer(bullet.COV_ENABLE_RENDERING, 1, lightPosition=light, **self._client)
 
     def _body(self, kind: int, **shape: Any) -> int:
         return bullet.createMultiBody(0.0, -1, bullet.createVisualShape(kind, **shape, **self._client), **self._client)
 
     def show(self, state: State, payload: Vector | None) -> None:
-        """The robot as it is, and the center of its payload (m), if it has one."""
+        """Show the robot's state and the center of its payload (m), if it has one."""
         center = np.add(state.position, rotate(self._spec.base.com, state.quat_xyzw)).tolist()
         bullet.resetBasePositionAndOrientation(self._robot, center, state.quat_xyzw, **self._client)
         if self._joints:
             angles = [[angle] for angle in state.q.tolist()]
             bullet.resetJointStatesMultiDof(self._robot, self._joints, angles, **self._client)
-        bullet.resetBasePositionAndOrientation(self._payload, payload or _AWAY, (0.0, 0.0, 0.0, 1.0), **self._client)
+        bullet.resetBasePositionAndOrientation(
+            self._payload, payload or _HIDDEN_POSITION, (0.0, 0.0, 0.0, 1.0), **self._client
+        )
 
     def close(self) -> None:
-        """Close it; safe to call twice, and after a person closed it."""
+        """Close it; safe to call twice and after the user closed it."""
         if self.open:
             bullet.disconnect(**self._client)
 
     @property
     def open(self) -> bool:
-        """Whether it is still there."""
+        """True until it is closed."""
         return bool(bullet.isConnected(**self._client))
 
     def pressed(self) -> list[str]:
-        """Keys that were pressed since this was last asked: "left", "right", "up", "down", "space", or a character."""
+        """Return keys pressed since the last call: "left", "right", "up", "down", "space" or a character."""
         new = []
         for key, state in bullet.getKeyboardEvents(**self._client).items():
             if state & bullet.KEY_WAS_TRIGGERED:
                 self._down.add(key)
                 new.append(key)
             elif state & bullet.KEY_WAS_RELEASED:
-                if key not in self._down:  # pressed and released between two questions: Bullet tells of the last only
+                if key not in self._down:  # pressed and released between two calls: Bullet reports only the release
                     new.append(key)
                 self._down.discard(key)
         return [_KEYS.get(key) or chr(key) for key in new if key in _KEYS or 32 < key < 127]
 
     def clicked(self, points: Sequence[Vector]) -> int | None:
-        """Which of some points (m) the left button was pressed at since this was last asked."""
+        """Return the index of the point (m) clicked with the left button since the last call."""
         presses = [
             (x, y)
             for kind, x, y, button, state in bullet.getMouseEvents(**self._client)
@@ -156,34 +158,34 @@ class BulletWindow:
         y = (1 - seen[:, 1] / seen[:, 3]) * height / 2
         off = np.hypot(x - presses[-1][0], y - presses[-1][1])
         nearest = int(np.argmin(off))
-        return nearest if off[nearest] < NEAR_CLICK else None
+        return nearest if off[nearest] < CLICK_RADIUS else None
 
     def ahead(self) -> Vector:
-        """Where the eye looks, along the ground (unit vector)."""
+        """Return the horizontal viewing direction (unit vector)."""
         x, y, _ = bullet.getDebugVisualizerCamera(**self._client)[5]
         size = float(np.hypot(x, y)) or 1.0
         return x / size, y / size, 0.0
 
     def look(self, camera: Camera) -> None:
-        """Look from where a camera is."""
+        """Set the view to that of a camera."""
         bullet.resetDebugVisualizerCamera(
             camera.distance, camera.yaw_deg, -camera.pitch_deg, camera.target, **self._client
         )
 
     def follow(self, target: Vector) -> None:
-        """Look at a place (m) from the same side as before: a person may have turned the view."""
+        """Look at a position (m) in the same direction as before, which the user may have changed."""
         *_, yaw, pitch, distance, _ = bullet.getDebugVisualizerCamera(**self._client)
         bullet.resetDebugVisualizerCamera(distance, yaw, pitch, target, **self._client)
 
     def write(self, lines: Sequence[str], place: Vector) -> None:
-        """Show lines of words above a place (m), in place of those before."""
+        """Show lines of text above a position (m), replacing previous ones."""
         x, y, z = place
         for number, line in enumerate(lines):
-            at = (x, y, z + ABOVE + _LINE * (len(lines) - number))
+            at = (x, y, z + TEXT_HEIGHT + _LINE_SPACING * (len(lines) - number))
             more = {"replaceItemUniqueId": self._words[number]} if number < len(self._words) else {}
             item = bullet.addUserDebugText(line, at, INK, 1.2, **more, **self._client)
             self._words[number : number + 1] = [item]
 
     def arrow(self, tail: Vector, tip: Vector) -> None:
-        """Show a force for a moment."""
-        bullet.addUserDebugLine(tail, tip, RED, 6.0, LASTING, **self._client)
+        """Show a force briefly as an arrow."""
+        bullet.addUserDebugLine(tail, tip, RED, 6.0, ARROW_LIFETIME, **self._client)

@@ -1,4 +1,4 @@
-"""A camera, and where it shows what: the same for every engine."""
+"""A pinhole camera with the same projection in every engine."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from artde_gym.arrays import Array
 from artde_gym.multibody.spec import Vector
 
-FIELD_OF_VIEW = 40.0  # degrees, from the lower to the upper edge
-NEAR = 0.05  # m, before the eye, where a picture begins
+FIELD_OF_VIEW = 40.0  # degrees, vertical
+NEAR = 0.05  # m, distance of the near clipping plane
 
 
 class Camera(NamedTuple):
@@ -27,7 +27,7 @@ class Camera(NamedTuple):
 
     @property
     def axes(self) -> Array:
-        """Unit vectors to the right, up and away from the eye, one a row, in world axes."""
+        """Unit vectors to the right, up and forward in the rows, in world axes."""
         yaw, pitch = math.radians(self.yaw_deg), math.radians(self.pitch_deg)
         right = (math.cos(yaw), math.sin(yaw), 0.0)
         away = (-math.sin(yaw) * math.cos(pitch), math.cos(yaw) * math.cos(pitch), -math.sin(pitch))
@@ -35,16 +35,16 @@ class Camera(NamedTuple):
 
     @property
     def eye(self) -> Array:
-        """Where the camera is (m)."""
+        """Position of the camera (m)."""
         return np.asarray(self.target) - self.distance * self.axes[2]
 
     @property
     def focal_length(self) -> float:
-        """In pixels: what is as far away as it is long fills so many."""
+        """Focal length (pixels): the size in the image of an object as long as it is far away."""
         return self.height / 2 / math.tan(math.radians(FIELD_OF_VIEW / 2))
 
     def pixels(self, points: ArrayLike) -> Array:
-        """Column and row (n, 2), from the upper left corner, of points (n, 3) (m); NaN for what is behind the eye."""
+        """Return column and row (n, 2), from the upper left corner, of points (n, 3) (m); NaN behind the camera."""
         right, up, away = self.axes @ (np.asarray(points, dtype=np.float64) - self.eye).T
         away = np.where(away > NEAR, away, np.nan)
         scale = self.focal_length / away

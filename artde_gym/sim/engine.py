@@ -1,4 +1,4 @@
-"""What an environment asks of a physics engine."""
+"""Protocols of physics engines."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from artde_gym.sim.rotation import Quaternion
 
 
 class State(NamedTuple):
-    """One robot at one instant; positions and velocities are those of the base link's origin, in world axes.
+    """The state of one robot; positions and velocities are those of the base link's origin, in world axes.
 
     `q`, `qd` (n,) are the actuated joints in the order of the spec (rad, rad/s).
     """
@@ -29,16 +29,16 @@ class State(NamedTuple):
     angular_velocity: Vector
 
 
-PAYLOAD_RADIUS = 0.08  # m, of the homogeneous ball that is the payload
-PAYLOAD_LOOK = 0.09  # m, likewise in pictures, so that it shows on either side of Ojas' torso
+PAYLOAD_RADIUS = 0.08  # m, of the payload, a homogeneous ball
+PAYLOAD_LOOK = 0.09  # m, its radius in rendered images, so that it is visible on either side of Ojas' torso
 PAYLOAD_COLOR = (0.85, 0.45, 0.1, 1.0)
 
 
 class World(Protocol):
-    """What happens to one robot from outside; gravity, friction and masses stay as they were set."""
+    """The external influences on one robot; gravity, friction and masses keep their values until changed."""
 
     def apply_force(self, site: str, force: Vector) -> None:
-        """Add a force (N, world axes) at a named site of the spec, where it is now, for the next step only.
+        """Add a force (N, world axes) at the current position of a named site of the spec, for the next step only.
 
         Raises:
             RobotError: for a site that the spec does not have.
@@ -53,22 +53,22 @@ class World(Protocol):
         ...
 
     def lift_feet(self, forces: Sequence[float]) -> None:
-        """Add upward forces (N) at the centers of mass of the feet, one a foot, for the next step only."""
+        """Add upward forces (N), one per foot, at the centers of mass of the feet, for the next step only."""
         ...
 
     def foot_loads(self) -> tuple[float, ...]:
-        """Normal force of the ground on each foot during the last step (N): z of `ground_forces`, and cheaper."""
+        """Return the normal force of the ground on each foot in the last step (N): z of `ground_forces`, but faster."""
         ...
 
     def set_friction(self, coefficient: float) -> None:
-        """Set the coefficient of Coulomb friction of the pair foot and ground, from the next step on.
+        """Set the coefficient of Coulomb friction between feet and ground, from the next step on.
 
-        Of the *pair*: whatever rule the engine has to combine coefficients of two bodies.
+        It is that of the *pair*, whatever the engine's rule for combining coefficients of two bodies.
         """
         ...
 
     def set_gravity(self, gravity: Vector) -> None:
-        """Set the acceleration of free fall (m/s^2, world axes)."""
+        """Set the gravitational acceleration (m/s^2, world axes)."""
         ...
 
     def scale_masses(
@@ -77,42 +77,42 @@ class World(Protocol):
         """Set mass and inertia of every link, and armature, to `factor` times the spec's; a payload keeps its own.
 
         Args:
-            factor: of everything.
-            links: name -> further factor of a link's mass and inertia; 1 for any other.
-            armature: further factor of the armature.
+            factor: factor of all masses, inertias and armatures.
+            links: name -> additional factor of a link's mass and inertia; 1 for any other.
+            armature: additional factor of the armature.
         """
         ...
 
     def set_contact_time(self, time: float | None) -> None:
-        """Set the time constant (s) with which the ground pushes a foot out; None for the engine's own.
+        """Set the time constant (s) with which the ground pushes a foot out; None for the engine's default.
 
-        MuJoCo: of its soft contacts, which are critically damped (its own is 0.005 s). Bullet: one time step over the
-        share of the depth that it corrects in each (its own is 0.0125 s).
+        MuJoCo: that of its critically damped soft contacts (default 0.005 s). Bullet: one time step divided by the
+        share of the penetration depth that is corrected per step (default 0.0125 s).
         """
         ...
 
     def attach_payload(self, mass: float, position: Vector) -> None:
         """Fix a ball of `mass` (kg) and `PAYLOAD_RADIUS` to the base link, its center at `position` in its frame (m).
 
-        It takes over the base's motion, touches nothing, and falls freely, also through the ground, once released. A
-        former payload is gone.
+        It has the base's velocity, collides with nothing, and falls freely, even through the ground, once released.
+        It replaces a previous payload.
         """
         ...
 
     def release_payload(self) -> None:
-        """Let go of the payload, if there is one."""
+        """Release the payload, if there is one."""
         ...
 
 
 class Engine(World, Protocol):
     """One robot on flat, level ground, which only the spec's collision shapes touch.
 
-    Its parts pass through each other, unless the spec says that its feet do not.
+    Its parts pass through each other, unless the spec makes its feet collide.
 
-    A copy (`copy.deepcopy`, `pickle`) is a world of its own that goes on as the copied one would, bit for bit.
+    A copy (`copy.deepcopy`, `pickle`) is an independent world that steps bitwise like the original.
 
-    Joints that the spec does not actuate are held at zero. Gravity and masses stay as they were set, whatever is placed
-    or restored afterwards; they start at 9.81 m/s^2 downward and at the spec's. Friction has no default: set it.
+    Unactuated joints are held at zero. Gravity and masses keep their values through `reset` and `restore_state`; they
+    start at 9.81 m/s^2 downward and at the spec's. Friction has no default: set it.
     """
 
     name: str
@@ -122,26 +122,26 @@ class Engine(World, Protocol):
     def reset(self, position: Vector, q: Array) -> None:
         """Put the upright robot with its base origin at `position` (m) and the joints at `q`, all at rest.
 
-        A payload is gone. The ground is felt from the next step on.
+        A payload is removed. Contact forces begin with the next step.
         """
         ...
 
     def save_state(self) -> int:
-        """Remember the whole state of a robot without a payload; returns a handle.
+        """Save the whole state of a robot without a payload; return a handle.
 
-        That is what `state`, `foot_loads` and `ground_forces` say, what the solver remembers, and the friction.
+        It contains `state`, `foot_loads`, `ground_forces`, the solver's warm start and the friction.
         """
         ...
 
     def restore_state(self, snapshot: int) -> None:
-        """Return to a snapshot, bit for bit; a payload attached since is gone.
+        """Restore a saved state bitwise; a payload attached since is removed.
 
-        Forces must not be pending: whether a push that no step has taken up yet survives is up to the engine.
+        No forces may be pending: engines differ in whether a push before the next step survives.
         """
         ...
 
     def state(self) -> State:
-        """The state now: after the last step, or as placed or restored. Later steps do not change what was read."""
+        """Return the current state: after the last step, reset or restore. Later steps do not change it."""
         ...
 
     def step(self, tau: Array) -> None:
@@ -151,12 +151,12 @@ class Engine(World, Protocol):
     def apply_base_wrench(self, force: Vector, torque: Vector) -> None:
         """Add a force (N) at the base link's own center of mass and a torque (Nm), for the next step only.
 
-        Both along the base's axes, as they are now; a payload does not move their point of action.
+        Both in the base's current axes; a payload does not move their point of action.
         """
         ...
 
     def site(self, name: str) -> Vector:
-        """Where a named site of the spec is now (m, world axes).
+        """Return the current position of a named site of the spec (m, world axes).
 
         Raises:
             RobotError: for a site that the spec does not have.
@@ -164,20 +164,20 @@ class Engine(World, Protocol):
         ...
 
     def payload_position(self) -> Vector | None:
-        """Where the payload's center is now (m, world axes), held or falling; None without one."""
+        """Return the current position of the payload's center (m, world axes), held or falling; None without one."""
         ...
 
     def ground_forces(self) -> Array:
-        """Whole force of the ground on each foot during the last step, (feet, 3) (N, world axes)."""
+        """Return the total force of the ground on each foot in the last step, (feet, 3) (N, world axes)."""
         ...
 
     def render(self, camera: Camera) -> NDArray[np.uint8]:
-        """A picture, (height, width, 3), of robot and payload on the ground of `artde_gym.sim.ground`.
+        """Render an image (height, width, 3) of robot and payload on the ground of `artde_gym.sim.ground`.
 
-        It changes nothing.
+        This does not change the state.
 
         Raises:
-            OptionError: where the engine cannot draw on this machine.
+            OptionError: if the engine cannot render on this machine.
         """
         ...
 

@@ -1,4 +1,4 @@
-"""What a script on an engine cannot do without: the loop that our environments are measured against."""
+"""Minimal simulation loops of the bare engines, the reference for the speed of environments."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from artde_gym.arrays import Array
 from artde_gym.sim.engine import Engine
 from artde_gym.sim.factory import missing_bullet
 
-MAX_CLIENTS = 1024  # of a process, a limit of PyBullet's
+MAX_CLIENTS = 1024  # per process, PyBullet's limit
 
 
 def joint_loop(engine: Engine) -> Callable[[Array], Any]:
-    """A function of joint torques: write them, step, read the joints."""
+    """Return a function of joint torques that writes them, steps and reads the joints."""
     if engine.name == "bullet":
         bullet, client, robot, joints = _bullet(engine)
 
@@ -38,7 +38,7 @@ def joint_loop(engine: Engine) -> Callable[[Array], Any]:
 
 
 def body_loop(engine: Engine, steps: int) -> Callable[[Array], Any]:
-    """A function of a wrench [u1 (N), u2, u3, u4 (Nm)]: `steps` times write it and step, then read the body."""
+    """Return a function of a wrench [u1 (N), u2, u3, u4 (Nm)] that writes it and steps `steps` times, then reads."""
     if engine.name == "bullet":
         (bullet, client, robot, _), origin = _bullet(engine), (0.0, 0.0, 0.0)
 
@@ -54,7 +54,7 @@ def body_loop(engine: Engine, steps: int) -> Callable[[Array], Any]:
 
         return in_bullet
     mj, model, data, _ = _mujoco(engine)
-    mj.mj_kinematics(model, data)  # restored states leave orientations to the first step
+    mj.mj_kinematics(model, data)  # after a restore, MuJoCo updates orientations only in the first step
 
     def in_mujoco(wrench: Array) -> Any:
         u1, *torque = wrench.tolist()
@@ -69,7 +69,7 @@ def body_loop(engine: Engine, steps: int) -> Callable[[Array], Any]:
 
 
 def open_clients() -> int:
-    """Count Bullet's physics clients that are open in this process; MuJoCo has none."""
+    """Count Bullet's open physics clients of this process; MuJoCo has none."""
     if missing_bullet():
         return 0
     from artde_gym.sim.pybullet_module import bullet
@@ -78,7 +78,7 @@ def open_clients() -> int:
 
 
 def _bullet(engine: Any) -> tuple[Any, Any, Any, Any]:
-    from artde_gym.sim.pybullet_module import bullet  # not everywhere; the engine that was given has it
+    from artde_gym.sim.pybullet_module import bullet  # not installed everywhere, but a Bullet engine implies it
 
     return bullet, engine._client, engine._robot, engine._joints
 

@@ -1,4 +1,4 @@
-"""The one table of physics engines, imported when asked for; which one is the default is decided here alone."""
+"""Registry of physics engines, imported on demand, and the choice of the default engine."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ class EngineSpec:
     """A physics engine.
 
     Attributes:
-        name: in arguments and on the command line.
-        title: as it is written.
+        name: name in arguments and on the command line.
+        title: name in texts.
         entry_point: "module:class" of an `artde_gym.sim.engine.Engine`, called with a robot's spec, `time_step` (s) and
-            `renders`, whether pictures will be asked for.
-        package: to install where it is missing, as `pip install` takes it.
+            `renders` (True if images will be rendered).
+        package: requirement for `pip install` if it is missing.
         vector_entry_point: "module:class" of many worlds at once (as `artde_gym.sim.mujoco_batch.MujocoBatch`), called
-            with a spec, their number, `time_step` and a number of threads; None for an engine without.
-        why_missing: in place of an attempt to import it: says why it cannot be used here and what to do about it; an
-            empty string where it can.
+            with a spec, their number, `time_step` and a number of threads; None if there is none.
+        why_missing: function that returns why it is unavailable and a remedy, or an empty string if it is available;
+            None: try to import it.
     """
 
     name: str
@@ -46,7 +46,7 @@ class EngineSpec:
     why_missing: Callable[[], str] | None = None
 
     def missing(self) -> str:
-        """Say why it cannot be used here and what to do about it; an empty string where it can."""
+        """Return why it is unavailable and a remedy; an empty string if it is available."""
         if self.why_missing is not None:
             return self.why_missing()
         try:
@@ -59,7 +59,7 @@ class EngineSpec:
         """Import one of its classes.
 
         Raises:
-            MissingDependencyError: if it cannot be used here.
+            MissingDependencyError: if it is unavailable.
         """
         if missing := self.missing():
             raise MissingDependencyError("engine", self.name, missing)
@@ -89,11 +89,11 @@ _MUJOCO = EngineSpec(
 ENGINES: Registry[EngineSpec] = Registry(
     "engine", "artde_gym.engines", lambda spec: {spec.name: spec}, {spec.name: spec for spec in (_BULLET, _MUJOCO)}
 )
-"""All engines by name; the first one that can be used is the default."""
+"""All engines by name; the first available one is the default."""
 
 
 def register_engine(spec: EngineSpec, *, replace: bool = False) -> None:
-    """Make an engine known to environments and to the command line.
+    """Register an engine for environments and the command line.
 
     Raises:
         OptionError: if its name is taken and `replace` is not given.
@@ -102,7 +102,7 @@ def register_engine(spec: EngineSpec, *, replace: bool = False) -> None:
 
 
 def resolve_engine(name: str | None) -> EngineName:
-    """Return the engine called `name`; for None, the first one that can be used here: Bullet before MuJoCo.
+    """Return the engine called `name`; for None, the first available one: Bullet before MuJoCo.
 
     Raises:
         OptionError: for an unknown engine.
@@ -115,13 +115,13 @@ def resolve_engine(name: str | None) -> EngineName:
 
 
 def installed_engines() -> dict[EngineName, str]:
-    """Return the engines that can be used here, and how they are written."""
+    """Return the available engines and their titles."""
     return {name: spec.title for name, spec in ENGINES.items() if not spec.missing()}
 
 
 @functools.cache
 def missing_bullet() -> str:
-    """Say why PyBullet cannot be imported here and what to do about it; an empty string where it can."""
+    """Return why PyBullet is unavailable and a remedy; an empty string if it is available."""
     try:
         importlib.import_module("artde_gym.sim.pybullet_module")
     except ImportError as error:
@@ -130,7 +130,7 @@ def missing_bullet() -> str:
 
 
 def why_no_bullet(error: ImportError) -> str:
-    """Say why an import of PyBullet failed, and what to do about it."""
+    """Return why an import of PyBullet failed and a remedy."""
     if error.name != "pybullet":
         return f"PyBullet is installed, but cannot be imported ({error})"
     if has_wheel(platform.python_implementation(), sys.version_info[:2], sys.platform, platform.machine()):
@@ -143,7 +143,7 @@ def why_no_bullet(error: ImportError) -> str:
 
 
 def has_wheel(implementation: str, version: tuple[int, int], system: str, machine: str) -> bool:
-    """Tell whether PyBullet 3.2.7 has a wheel for a supported Python: the marker in pyproject.toml says the same."""
+    """Return True if PyBullet 3.2.7 has a wheel for this Python; keep in step with the marker in pyproject.toml."""
     return (implementation, system, machine) == ("CPython", "linux", "x86_64") and version < (3, 12)
 
 
@@ -151,11 +151,11 @@ def make_engine(name: EngineName | None, spec: RobotSpec, time_step: float, *, r
     """Build `spec` in the engine called `name`, or in the default one.
 
     Args:
-        time_step: of the physics (s).
-        renders: whether pictures will be asked for: an engine that cannot draw on this machine then says so at once.
+        time_step: physics time step (s).
+        renders: whether images will be rendered; if the engine cannot do so on this machine, it fails immediately.
 
     Raises:
-        OptionError: for an unknown engine, one that is not installed (MissingDependencyError), or one that cannot draw.
+        OptionError: for an engine that is unknown, not installed (MissingDependencyError) or unable to render.
         RobotError: for a robot that the engine cannot simulate.
     """
     engine = ENGINES[resolve_engine(name)]
@@ -163,7 +163,7 @@ def make_engine(name: EngineName | None, spec: RobotSpec, time_step: float, *, r
 
 
 def make_batch(name: EngineName, spec: RobotSpec, n: int, time_step: float, threads: int) -> MujocoBatch:
-    """Build `n` worlds of `spec` in the engine called `name`, stepped by so many threads.
+    """Build `n` worlds of `spec` in the engine called `name`, stepped by `threads` threads.
 
     Raises:
         OptionError: for an engine that has no batches.

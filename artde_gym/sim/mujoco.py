@@ -1,11 +1,11 @@
-"""The engine protocol on MuJoCo.
+"""MuJoCo as an `Engine`.
 
-MuJoCo's habits that stay in here: a quaternion's w comes first; the spin of a free base is in base axes; applied forces
-stay until they are taken back; after a step the places of links and sites are still those of before it; what the
-constraint solver knows of the masses follows them only when asked to; a robot that diverges would jump to its start.
+MuJoCo's peculiarities are handled here: a quaternion's w comes first; the angular velocity of a free base is in base
+axes; applied forces stay until they are cleared; after a step, positions of links and sites are still those before it;
+the solver's constants that depend on masses are updated only on request; a diverging robot would be reset.
 
-The payload is a body without a joint, and so a rigid part of the base. Once released nothing touches it any more: its
-fall is the formula of free fall.
+The payload is a body without a joint, and so a rigid part of the base. Once released, it collides with nothing and its
+position follows from the formula of free fall.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ mj: Any = mujoco  # compiled, without type information
 
 
 class _Fall(NamedTuple):
-    """A released payload: where and how fast it was, and when."""
+    """A released payload: its position, velocity and time of release."""
 
     position: Array
     velocity: Array
@@ -37,7 +37,7 @@ class _Fall(NamedTuple):
 
 
 class MujocoEngine(MujocoWorld):
-    """One robot on a plane in a MuJoCo model of its own.
+    """One robot on a plane in its own MuJoCo model.
 
     Raises:
         RobotError: for a robot whose rotors are links.
@@ -83,7 +83,7 @@ class MujocoEngine(MujocoWorld):
         mj.mj_setState(self._model, self._data, state, STATE)
 
     def __getstate__(self) -> dict[str, Any]:
-        """All that a copy needs: an equal world of its own, which steps as this one would, bit for bit."""
+        """Return the state of a copy: an independent world that steps bitwise like this one."""
         return {
             "built": (self.spec, self.time_step),
             "renders": self._canvas is not None,

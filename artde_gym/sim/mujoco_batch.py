@@ -1,6 +1,6 @@
-"""Many robots at once in MuJoCo, each in a world of its own: `mujoco.batch`, which steps them on a pool of threads.
+"""Many robots at once in MuJoCo, each in its own world, stepped by a pool of threads with `mujoco.batch`.
 
-A world does the same to the bit as `MujocoEngine` does to one robot, whatever the number of worlds and of threads.
+Each world behaves bitwise like `MujocoEngine`, for any number of worlds and threads.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from artde_gym.sim.rotation import rotate
 mj: Any = mujoco  # compiled, without type information
 
 Ids = NDArray[np.int32]
-"""Numbers of worlds, each once and in order."""
+"""Indices of worlds, sorted and unique."""
 
 
 class States(NamedTuple):
-    """Robots at one instant, as in `artde_gym.sim.engine.State`; `q` and `qd` are (n, joints), each component (n,)."""
+    """The states of robots, as `artde_gym.sim.engine.State`; `q` and `qd` are (n, joints), other components (n,)."""
 
     q: Array
     qd: Array
@@ -39,16 +39,16 @@ class MujocoBatch:
     """`n` worlds of one robot.
 
     Args:
-        spec: of the robot.
+        spec: the robot's spec.
         n: number of worlds.
-        time_step: of the physics (s).
-        threads: that step the worlds, the caller's included.
+        time_step: physics time step (s).
+        threads: number of threads that step the worlds, including the caller's.
 
     Attributes:
-        worlds: what can be done to each of them.
+        worlds: the interface of each world.
 
     Raises:
-        RobotError: for a robot whose rotors are links, or whose actuated joints are not next to each other in the tree.
+        RobotError: for a robot whose rotors are links, or whose actuated joints are not consecutive in the tree.
     """
 
     def __init__(self, spec: RobotSpec, n: int, time_step: float, threads: int) -> None:
@@ -56,15 +56,15 @@ class MujocoBatch:
         self._blueprint = blueprint = Blueprint(spec, time_step)
         joints = blueprint.joints
         if not isinstance(joints, slice):
-            raise RobotError("actuated joints", spec.actuated, "joints that follow one another in the tree")
+            raise RobotError("actuated joints", spec.actuated, "consecutive joints of the tree")
         self._angles, self._speeds = slice(7 + joints.start, 7 + joints.stop), slice(6 + joints.start, 6 + joints.stop)
         self._batch = batch = Batch(blueprint.model, n, threads)
         self._pose, self._twist, self._torque = (batch.bind(name) for name in ("qpos", "qvel", "qfrc_applied"))
         self._sensors = batch.bind("sensordata")
-        self._forces = np.zeros(self._sensors.shape)  # as of `_sensors`, and those of restored snapshots
+        self._forces = np.zeros(self._sensors.shape)  # from `_sensors`, or from restored states
         self._place = mj.MjData(blueprint.model)
         self._pushes = batch.bind("xfrc_applied")
-        self._pushed: list[int] = []  # worlds with forces that the next step takes up
+        self._pushed: list[int] = []  # worlds with forces for the next step
         self._lifted = False  # whether feet may have such forces in any world
         fields = [*map(batch.expand, FIELDS), self._pushes]
         self._friction = fields[FIELDS.index("pair_friction")]
@@ -72,7 +72,7 @@ class MujocoBatch:
         self._snapshots: list[tuple[Array, Array, Array]] = []
 
     def __getstate__(self) -> dict[str, Any]:
-        """All that a copy needs: equal worlds of its own, which step as these would, bit for bit."""
+        """Return the state of a copy: independent worlds that step bitwise like these."""
         return {
             "built": self._built,
             "snapshots": self._snapshots,
@@ -90,38 +90,38 @@ class MujocoBatch:
         self._forces[:] = state["forces"]
 
     def reset(self, world: int, position: Vector, q: Array) -> None:
-        """Put the upright robot of a world at `position` (m), the joints at `q`, all at rest, without a payload."""
+        """Put the upright robot of a world at `position` (m) with joints at `q`, all at rest, without a payload."""
         self.worlds[world].release_payload()
         self._batch.reset(np.array([world]), stage=mj.mjtStage.mjSTAGE_NONE)
         self._pose[world, :7] = (*position, 1.0, 0.0, 0.0, 0.0)
         self._pose[world, self._angles] = q
 
     def save_state(self, world: int) -> int:
-        """Remember the state of a world without a payload; returns a handle."""
+        """Save the state of a world without a payload; return a handle."""
         parts = (self._batch.state, self._forces, self._friction)
         state, forces, friction = (part[world].copy() for part in parts)
         self._snapshots.append((state, forces, friction))
         return len(self._snapshots) - 1
 
     def restore_state(self, worlds: Ids, snapshot: int) -> None:
-        """Return to a snapshot in some worlds, bit for bit; payloads are gone."""
+        """Restore a saved state in some worlds bitwise; payloads are removed."""
         for world in worlds.tolist():
             self.worlds[world].release_payload()
         self._batch.state[worlds], self._forces[worlds], self._friction[worlds] = self._snapshots[snapshot]
 
     def state(self) -> States:
-        """The states now; views, where possible, of what the next step changes."""
+        """Return the current states; where possible views, which the next step changes."""
         x, y, z, w, i, j, k = self._pose[:, :7].T
         vx, vy, vz, wx, wy, wz = self._twist[:, :6].T
         quat = (i, j, k, w)
         return States(*self.joints(), (x, y, z), quat, (vx, vy, vz), rotate((wx, wy, wz), quat))
 
     def joints(self, worlds: Ids | slice = slice(None)) -> tuple[Array, Array]:
-        """q and qd (n, joints) of some worlds; of all of them views."""
+        """Return q and qd (n, joints) of some worlds; views if of all."""
         return self._pose[worlds, self._angles], self._twist[worlds, self._speeds]
 
     def step(self, tau: Array, worlds: Ids | None = None, steps: int = 1) -> None:
-        """Advance some worlds, or all, by so many time steps under torques `tau` (worlds, joints) (Nm)."""
+        """Advance some worlds, or all, by `steps` time steps under torques `tau` (worlds, joints) (Nm)."""
         rows = slice(None) if worlds is None else worlds
         self._torque[rows, self._speeds] = tau
         self._batch.step(worlds, steps)
@@ -136,21 +136,21 @@ class MujocoBatch:
     def lift_feet(self, forces: Array) -> None:
         """Add upward forces (n, feet) (N) at the centers of mass of the feet, for the next step only.
 
-        A world that has a force must be among those of the next step.
+        The next step must include every world that has a force.
         """
         self._pushes[:, self._blueprint.feet, 2] += forces
         self._lifted = True
 
     def foot_loads(self) -> Array:
-        """Normal forces on the feet during the last step (n, feet) (N); a view."""
+        """Return the normal forces on the feet in the last step (n, feet) (N); a view."""
         return self._forces[:, 2::3]
 
     def ground_forces(self) -> Array:
-        """Forces of the ground on the feet during the last step (n, 3 feet) (N, world axes); a view."""
+        """Return the forces of the ground on the feet in the last step (n, 3 feet) (N, world axes); a view."""
         return self._forces
 
     def placed(self, world: int) -> Any:
-        """See `MujocoWorld.placed`; until the next call."""
+        """See `MujocoWorld.placed`; valid until the next call."""
         self._place.qpos[:] = self._pose[world]
         mj.mj_kinematics(self._blueprint.model, self._place)
         return self._place
@@ -160,7 +160,7 @@ class MujocoBatch:
         self._batch.set_const(np.array([world]))
 
     def pushed(self, world: int) -> None:
-        """A world has forces that act in the next step only."""
+        """Note that a world has forces for the next step."""
         self._pushed.append(world)
 
 

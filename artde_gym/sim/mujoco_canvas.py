@@ -1,6 +1,6 @@
-"""Pictures of a MuJoCo world, drawn by OpenGL without a display: through EGL, or else OSMesa.
+"""Offscreen rendering of a MuJoCo world with OpenGL, through EGL or else OSMesa.
 
-The environment variable MUJOCO_GL ("egl", "osmesa") chooses one of them, as everywhere in MuJoCo.
+The environment variable MUJOCO_GL ("egl", "osmesa") selects one, as usual in MuJoCo.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ _LIBRARIES = {"egl": "libEGL.so.1", "osmesa": "libOSMesa.so.8"}
 _ALLOWED = (
     "with OpenGL of EGL or OSMesa (Debian: apt install libegl1 libgl1-mesa-dri, or libosmesa6); or engine 'bullet'"
 )
-_SHAPES = 1000  # at most, in a scene
+_MAX_SHAPES = 1000  # most shapes in a scene
 
 
 class Canvas:
-    """Draws one model.
+    """A renderer of one model.
 
     Raises:
-        OptionError: where there is no OpenGL without a display.
+        OptionError: if offscreen OpenGL is unavailable.
     """
 
     def __init__(self, model: Any) -> None:
@@ -44,13 +44,13 @@ class Canvas:
         context.make_current()
         self._painter = mj.MjrContext(model, mj.mjtFontScale.mjFONTSCALE_100)
         mj.mjr_setBuffer(mj.mjtFramebuffer.mjFB_OFFSCREEN, self._painter)
-        self._scene = mj.MjvScene(model, _SHAPES)
+        self._scene = mj.MjvScene(model, _MAX_SHAPES)
         self._finalizer = weakref.finalize(self, _free, context, self._painter)
         self._finalizer.atexit = False  # too late: EGL's display is closed by then
         atexit.register(self._finalizer)
 
     def draw(self, data: Any, camera: Camera, ball: Vector | None) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
-        """A picture, (height, width, 3), with the payload's ball at `ball` (m), if there is one; where it is bare."""
+        """Render an image (height, width, 3), with the payload at `ball` (m), if any; also return its empty pixels."""
         scene, rect = self._scene, mj.MjrRect(0, 0, camera.width, camera.height)
         eye = mj.MjvCamera()
         eye.lookat[:] = camera.target
@@ -72,13 +72,13 @@ class Canvas:
         return picture[::-1].copy(), depth[::-1] == 1.0  # OpenGL counts rows from below
 
     def close(self) -> None:
-        """Free what the context holds; safe to call twice."""
+        """Free the context; safe to call twice."""
         self._finalizer()
         atexit.unregister(self._finalizer)
 
 
 def _context() -> Any:
-    """An OpenGL context without a display; macOS and Windows have one of their own, which MuJoCo knows."""
+    """Create an offscreen OpenGL context; on macOS and Windows, MuJoCo uses the system's."""
     if sys.platform != "linux":
         return importlib.import_module("mujoco.gl_context").GLContext(1, 1)
     chosen = os.environ.get("MUJOCO_GL", "").lower()
@@ -88,7 +88,7 @@ def _context() -> Any:
         except OSError:
             continue
         try:
-            return importlib.import_module(f"mujoco.{name}").GLContext(1, 1)  # it draws into a buffer of its own
+            return importlib.import_module(f"mujoco.{name}").GLContext(1, 1)  # any size: it draws into its own buffer
         except (ImportError, AttributeError, RuntimeError) as error:
             raise OptionError("render_mode", "rgb_array", f"{_ALLOWED}; {name} said: {error}") from error
     raise OptionError("render_mode", "rgb_array", _ALLOWED)

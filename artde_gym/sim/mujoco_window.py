@@ -1,4 +1,4 @@
-"""A window that MuJoCo draws with GLFW: it shows a robot that is simulated elsewhere, and says what a person does."""
+"""MuJoCo's window with GLFW: shows a robot that is simulated elsewhere and reads keys and clicks."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from artde_gym.sim.mujoco_world import Blueprint
 mj: Any = mujoco  # compiled, without type information
 
 SIZE = (1024, 768)
-NEAR_CLICK = 60.0  # pixels, that a click may be off what it is meant for
+CLICK_RADIUS = 60.0  # pixels, largest distance of a click from its target
 RED, GROUND = (0.77, 0.09, 0.24, 1.0), (0.82, 0.84, 0.86, 1.0)
-THIN = 0.012  # m, of an arrow
-LASTING = 12  # pictures, that an arrow stays
-SHAPES = 1000  # at most, in a scene
-ZOOM = -0.05  # of the distance, by a notch of the wheel
+ARROW_THICKNESS = 0.012  # m
+ARROW_FRAMES = 12  # lifetime of an arrow
+MAX_SHAPES = 1000  # most shapes in a scene
+ZOOM_SHARE = -0.05  # of the distance, per notch of the wheel
 
 _KEYS = {
     glfw.KEY_LEFT: "left",
@@ -39,12 +39,12 @@ _KEYS = {
 
 
 class MujocoWindow:
-    """A window onto the world of an engine, whichever it is: it shows what `show` says, and simulates nothing.
+    """A window that displays the robot of any engine; it simulates nothing.
 
-    A drag of the left button turns the view, the wheel comes nearer; `load` before anything is shown.
+    Dragging with the left button turns the view, the wheel zooms. Call `load` first.
 
     Raises:
-        OptionError: without a display, or without OpenGL on it.
+        OptionError: without a display with OpenGL.
     """
 
     def __init__(self) -> None:
@@ -52,9 +52,11 @@ class MujocoWindow:
         glfw.set_error_callback(lambda _, text: errors.append(str(text)))
         self._window: Any = glfw.create_window(*SIZE, "artde-gym", None, None) if glfw.init() else None
         if self._window is None:
-            why = errors[-1] if errors else "GLFW says nothing"
+            why = errors[-1] if errors else "GLFW reports no reason"
             raise OptionError(
-                "display", os.environ.get("DISPLAY"), f"one that shows OpenGL ({why}); `artde-gym video` needs none"
+                "display",
+                os.environ.get("DISPLAY"),
+                f"a display with OpenGL ({why}); `artde-gym video` works without one",
             )
         glfw.make_context_current(self._window)
         glfw.swap_interval(0)
@@ -68,18 +70,20 @@ class MujocoWindow:
         glfw.set_char_callback(self._window, lambda _, code: self._keys.append(chr(code)) if code != 32 else None)
         glfw.set_mouse_button_callback(self._window, self._on_button)
         glfw.set_cursor_pos_callback(self._window, self._on_move)
-        glfw.set_scroll_callback(self._window, lambda _, _x, y: self._turn(mj.mjtMouse.mjMOUSE_ZOOM, 0.0, ZOOM * y))
+        glfw.set_scroll_callback(
+            self._window, lambda _, _x, y: self._turn(mj.mjtMouse.mjMOUSE_ZOOM, 0.0, ZOOM_SHARE * y)
+        )
 
     def load(self, spec: RobotSpec) -> None:
-        """Build the robot, and begin to draw."""
+        """Build the robot and start drawing."""
         blueprint = Blueprint(spec, 0.001)
         self._model, self._joints = blueprint.model, blueprint.joints
         self._data = mj.MjData(self._model)
-        self._scene = mj.MjvScene(self._model, SHAPES)
+        self._scene = mj.MjvScene(self._model, MAX_SHAPES)
         self._painter = mj.MjrContext(self._model, mj.mjtFontScale.mjFONTSCALE_150)
 
     def show(self, state: State, payload: Vector | None) -> None:
-        """Show the robot as it is, and the center of its payload (m), if it has one."""
+        """Show the robot's state and the center of its payload (m), if it has one."""
         if not self.open:
             return
         self._data.qpos[:3] = state.position
@@ -92,8 +96,8 @@ class MujocoWindow:
         if payload is not None:
             self._shape(mj.mjtGeom.mjGEOM_SPHERE, payload, (PAYLOAD_LOOK, 0.0, 0.0), PAYLOAD_COLOR)
         for tail, tip, _ in self._arrows:
-            shape = self._shape(mj.mjtGeom.mjGEOM_ARROW, tail, (THIN, THIN, THIN), RED)
-            mj.mjv_connector(shape, mj.mjtGeom.mjGEOM_ARROW, THIN, np.array(tail), np.array(tip))
+            shape = self._shape(mj.mjtGeom.mjGEOM_ARROW, tail, (ARROW_THICKNESS, ARROW_THICKNESS, ARROW_THICKNESS), RED)
+            mj.mjv_connector(shape, mj.mjtGeom.mjGEOM_ARROW, ARROW_THICKNESS, np.array(tail), np.array(tip))
         self._arrows = [(tail, tip, left - 1) for tail, tip, left in self._arrows if left > 1]
         rect = mj.MjrRect(0, 0, *glfw.get_framebuffer_size(self._window))
         mj.mjr_render(rect, self._scene, self._painter)
@@ -102,7 +106,7 @@ class MujocoWindow:
         glfw.swap_buffers(self._window)
 
     def close(self) -> None:
-        """Close it; safe to call twice, and after a person closed it."""
+        """Close it; safe to call twice and after the user closed it."""
         if self._window is not None:
             if hasattr(self, "_painter"):
                 self._painter.free()
@@ -112,48 +116,48 @@ class MujocoWindow:
 
     @property
     def open(self) -> bool:
-        """Whether it is still there."""
+        """True until it is closed."""
         return self._window is not None and not glfw.window_should_close(self._window)
 
     def pressed(self) -> list[str]:
-        """Keys pressed since this was last asked: "left", "right", "up", "down", "space", or a character."""
+        """Return keys pressed since the last call: "left", "right", "up", "down", "space" or a character."""
         glfw.poll_events()
         keys = list(self._keys)
         self._keys.clear()
         return keys
 
     def clicked(self, points: Sequence[Vector]) -> int | None:
-        """Return which of some points (m) the left button was pressed at since this was last asked."""
+        """Return the index of the point (m) clicked with the left button since the last call."""
         presses, self._presses = self._presses, []
         if not presses:
             return None
         off = np.hypot(*(self._project(np.asarray(points)) - np.array(presses[-1])).T)
         nearest = int(np.argmin(off))
-        return nearest if off[nearest] < NEAR_CLICK else None
+        return nearest if off[nearest] < CLICK_RADIUS else None
 
     def ahead(self) -> Vector:
-        """Return where the eye looks, along the ground (unit vector)."""
+        """Return the horizontal viewing direction (unit vector)."""
         azimuth = np.radians(self._eye.azimuth)
         return float(np.cos(azimuth)), float(np.sin(azimuth)), 0.0
 
     def look(self, camera: Camera) -> None:
-        """Look from where a camera is."""
+        """Set the view to that of a camera."""
         self._eye.lookat[:] = camera.target
         self._eye.distance, self._eye.elevation = camera.distance, -camera.pitch_deg
         self._eye.azimuth = camera.yaw_deg + 90.0
 
     def follow(self, target: Vector) -> None:
-        """Look at a place (m) from the same side as before: a person may have turned the view."""
+        """Look at a position (m) in the same direction as before, which the user may have changed."""
         self._eye.lookat[:] = target
 
     def write(self, lines: Sequence[str], place: Vector) -> None:
-        """Show lines of words in the corner, in place of those before."""
+        """Show lines of text in the corner, replacing previous ones."""
         del place
         self._lines = lines
 
     def arrow(self, tail: Vector, tip: Vector) -> None:
-        """Show a force for a moment."""
-        self._arrows.append((tail, tip, LASTING))
+        """Show a force briefly as an arrow."""
+        self._arrows.append((tail, tip, ARROW_FRAMES))
 
     def _shape(self, kind: Any, place: Vector, size: Vector, color: tuple[float, ...]) -> Any:
         """Add a shape to the scene."""
@@ -164,7 +168,7 @@ class MujocoWindow:
         return shape
 
     def _project(self, points: Array) -> Array:
-        """Return the pixels (n, 2) of points (n, 3) of the world, counted from the upper left corner."""
+        """Return the pixels (n, 2), from the upper left corner, of points (n, 3) (m)."""
         width, height = glfw.get_window_size(self._window)
         azimuth, elevation = np.radians(self._eye.azimuth), np.radians(self._eye.elevation)
         ahead = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])

@@ -1,7 +1,6 @@
-"""One robot's world in MuJoCo, as far as it differs from others: masses, payload, friction, gravity, and forces.
+"""Properties of one world in MuJoCo: masses, payload, friction, gravity and forces.
 
-A world lives in a model of its own, or in one row of the fields that MuJoCo keeps for each world of a batch. To find
-out where something is and to set it is the same in both.
+A world is either a model or one row of a batch's fields; both are read and set in the same way here.
 """
 
 from __future__ import annotations
@@ -23,13 +22,13 @@ from artde_gym.sim.engine import PAYLOAD_RADIUS
 
 mj: Any = mujoco  # compiled, without type information
 
-STATE = mj.mjtState.mjSTATE_INTEGRATION  # all that the next step depends on
+STATE = mj.mjtState.mjSTATE_INTEGRATION  # everything that the next step depends on
 FIELDS = ("body_mass", "body_inertia", "body_pos", "dof_armature", "pair_friction", "pair_solref", "opt.gravity")
-"""What worlds may have of their own, by MuJoCo's names; what follows from it comes with `masses_changed`."""
+"""Fields of MuJoCo's model that differ between worlds; `masses_changed` updates the ones derived from them."""
 
 
 class Blueprint:
-    """The model of a robot on a plane, and what is where in it.
+    """The model of a robot on a plane, with the indices of its parts.
 
     Raises:
         RobotError: for a robot whose rotors are links.
@@ -46,7 +45,7 @@ class Blueprint:
         self.feet = [model.body(name).id for name in spec.feet]
         self.payload = model.body(PAYLOAD).id
         self.sites = {name: model.site(name).id for name, _, _ in spec.sites}
-        # MuJoCo numbers the coordinates of the base first, and those of joints by the tree
+        # MuJoCo orders coordinates as the base's, then the joints' in the order of the tree
         self.joints = _span([model.joint(name).dofadr[0] - 6 for name in spec.actuated])
         self.mass, self.inertia = model.body_mass.copy(), model.body_inertia.copy()
         self.armature = model.dof_armature.copy()
@@ -66,21 +65,21 @@ class Fields(NamedTuple):
 
 
 class MujocoWorld(abc.ABC):
-    """A world as the protocol `artde_gym.sim.engine.World` has it."""
+    """A world with the protocol `artde_gym.sim.engine.World`."""
 
     def __init__(self, blueprint: Blueprint, fields: Fields) -> None:
         self.spec = blueprint.spec
-        self.held: Vector | None = None  # where the payload is on the base
+        self.held: Vector | None = None  # position of the payload on the base
         self._blueprint, self._fields = blueprint, fields
         self._scales: tuple[float, dict[str, float], float] = (1.0, {}, 1.0)
 
     @abc.abstractmethod
     def placed(self) -> Any:
-        """MuJoCo's data with the places of bodies and sites now."""
+        """Return MuJoCo's data with current positions of bodies and sites."""
 
     @abc.abstractmethod
     def masses_changed(self) -> None:
-        """Bring what the constraint solver knows of the masses up to date."""
+        """Update the solver's constants that depend on masses."""
 
     @abc.abstractmethod
     def foot_loads(self) -> tuple[float, ...]: ...
@@ -101,7 +100,7 @@ class MujocoWorld(abc.ABC):
             self.add_force(foot, (0.0, 0.0, force), (0.0, 0.0, 0.0))
 
     def site(self, name: str) -> Vector:
-        """As of `artde_gym.sim.engine.Engine`."""
+        """See `artde_gym.sim.engine.Engine`."""
         number = self._site(name)
         x, y, z = self.placed().site_xpos[number].tolist()
         return x, y, z
@@ -140,7 +139,7 @@ class MujocoWorld(abc.ABC):
         self.masses_changed()
 
     def settings(self) -> dict[str, Any]:
-        """What of this world differs from the blueprint, to be given to `set_up`."""
+        """Return this world's differences from the blueprint, for `set_up`."""
         fields = self._fields
         mass = float(fields.body_mass[self._blueprint.payload])
         friction, gravity = fields.pair_friction.copy(), fields.gravity.copy()
@@ -154,7 +153,7 @@ class MujocoWorld(abc.ABC):
         }
 
     def set_up(self, settings: dict[str, Any]) -> None:
-        """Make this world as another one was."""
+        """Apply the settings of another world."""
         self.scale_masses(*settings["scales"])
         mass, place = settings["payload"]
         if place is not None:
@@ -181,6 +180,6 @@ class MujocoWorld(abc.ABC):
 
 
 def _span(numbers: list[int]) -> slice | list[int]:
-    """Consecutive numbers as a slice, which is faster to index by."""
+    """Return consecutive numbers as a slice, which makes indexing faster."""
     first = numbers[0] if numbers else 0
     return slice(first, first + len(numbers)) if numbers == list(range(first, first + len(numbers))) else numbers

@@ -1,4 +1,4 @@
-"""PyBullet, imported without the line that its C code greets every process with."""
+"""PyBullet, imported without the line that its C code prints."""
 
 from __future__ import annotations
 

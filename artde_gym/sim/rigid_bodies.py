@@ -1,16 +1,16 @@
-"""Many free rigid bodies at once, in NumPy alone: each with constants of its own, none touching another.
+"""NumPy simulation of many free rigid bodies, each with its own constants, without collisions.
 
-Components lie along the first axes and bodies along the last one, (3, n), and all arithmetic is elementwise, so that
-what happens to a body does not depend on how many others there are.
+Components are on the first axes and bodies on the last one, (3, n), and all arithmetic is elementwise, so that
+results for a body do not depend on the number of bodies.
 
-A step of h is a drift of h/2, a kick of h with forces that belong to the middle of it, and a drift of h/2; neighboring
-drifts may be made one. The error of this splitting is of second order:
+A step of h is a drift of h/2, a kick of h with forces at its middle, and a drift of h/2; consecutive drifts may be
+merged. This splitting is of second order:
 
 drift h:   p <- p + h v,   q <- q (1, w / |w| tan(h |w| / 2)) / norm
 kick h:    v <- v + h (F / m + g),   w <- w + h w',   I w' = tau - w_m x I w_m
 
 with p, v of the center of mass in world axes, q from body to world, and w, I, tau in body axes about the center of
-mass. w_m = w + h/2 w' of the kick before belongs to the middle of the kick.
+mass. w_m = w + h/2 w', with w' of the previous kick, approximates w in the middle of the kick.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 
 
 class MassProperties(NamedTuple):
-    """Of one rigid body: mass (kg), center of mass in the body frame (m), inertia about it (3, 3) (kg m^2)."""
+    """Mass (kg), center of mass in the body frame (m) and inertia about it (3, 3) (kg m^2) of a rigid body."""
 
     mass: float
     com: Vector
@@ -38,7 +38,7 @@ class MassProperties(NamedTuple):
 
 
 def composite(*parts: MassProperties) -> MassProperties:
-    """Several bodies fixed to each other as one."""
+    """Combine bodies that are fixed to each other."""
     mass = total(part.mass for part in parts)
     com = np.sum([part.mass * np.asarray(part.com) for part in parts], axis=0) / mass
     inertia = np.zeros((3, 3))
@@ -53,9 +53,9 @@ class RigidBodies:
     """The states of `n` bodies.
 
     Attributes:
-        com, com_velocity: of the centers of mass (3, n) (m, m/s), world axes.
-        quat_xyzw: body to world (4, n).
-        rot: the same as matrices (3, 3, n).
+        com, com_velocity: positions and velocities of the centers of mass (3, n) (m, m/s), world axes.
+        quat_xyzw: attitudes, body to world (4, n).
+        rot: the attitudes as matrices (3, 3, n).
         rates: angular velocities (3, n) (rad/s), body axes.
     """
 
@@ -72,7 +72,7 @@ class RigidBodies:
         self._square = zeros(4)
 
     def set_properties(self, body: int, properties: MassProperties) -> None:
-        """Give a body other constants while its origin moves on undisturbed, as if something came or went unfelt."""
+        """Change a body's constants without changing the motion of its origin."""
         point, velocity = self.origin(body), self.origin_velocity(body)
         x, y, z = self._arm[:, body] = properties.com
         self._arm_cross[..., body] = ((0.0, z, -y), (-z, 0.0, x), (y, -x, 0.0))
@@ -90,15 +90,15 @@ class RigidBodies:
         self.com[:, body] = np.add(origin, self._arm[:, body])
 
     def motion(self) -> tuple[Array, ...]:
-        """The arrays that a step changes, bodies along the last axis."""
+        """Return the arrays that a step changes, bodies on the last axis."""
         return self.com, self.com_velocity, self.quat_xyzw, self.rot, self.rates, self._acceleration
 
     def origin(self, bodies: int | slice = ALL) -> Array:
-        """Positions of the bodies' origins (3, n) (m), world axes."""
+        """Return positions of the bodies' origins (3, n) (m), world axes."""
         return self.com[:, bodies] - times(self.rot[..., bodies], self._arm[:, bodies])
 
     def origin_velocity(self, bodies: int | slice = ALL) -> Array:
-        """Velocities of the bodies' origins (3, n) (m/s), world axes."""
+        """Return velocities of the bodies' origins (3, n) (m/s), world axes."""
         across = times(self._arm_cross[..., bodies], self.rates[:, bodies])  # w x arm
         return self.com_velocity[:, bodies] - times(self.rot[..., bodies], across)
 
@@ -118,7 +118,7 @@ class RigidBodies:
         self._update_rot()
 
     def kick(self, duration: float, force: Array, torque: Array) -> None:
-        """Change velocities by a `force` (3, n) (N, world axes) and a `torque` (3, n) (Nm, body axes) at the origin."""
+        """Integrate a `force` (3, n) (N, world axes) and a `torque` (3, n) (Nm, body axes) at the origin."""
         self.com_velocity += force * (duration * self._inverse_mass)
         self.com_velocity[2] -= duration * GRAVITY
         middle = self.rates + (0.5 * duration) * self._acceleration
@@ -145,7 +145,7 @@ class RigidBodies:
 
 
 def times(matrices: Array, vectors: Array) -> Array:
-    """Matrices (3, 3, ...) times vectors (3, ...), body by body; the order of the sum is fixed."""
+    """Multiply matrices (3, 3, ...) by vectors (3, ...) for each body, summing in a fixed order."""
     out = matrices[:, 0] * vectors[0]
     out += matrices[:, 1] * vectors[1]
     out += matrices[:, 2] * vectors[2]
@@ -153,7 +153,7 @@ def times(matrices: Array, vectors: Array) -> Array:
 
 
 def transposed_times(matrices: Array, vectors: Array) -> Array:
-    """Transposed matrices (3, 3, ...) times vectors (3, ...), likewise."""
+    """Multiply transposed matrices (3, 3, ...) by vectors (3, ...) as `times` does."""
     out = matrices[0] * vectors[0]
     out += matrices[1] * vectors[1]
     out += matrices[2] * vectors[2]
@@ -161,12 +161,12 @@ def transposed_times(matrices: Array, vectors: Array) -> Array:
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Cross products of vectors (3, ...), body by body."""
+    """Return cross products of vectors (3, ...) for each body."""
     return a.take(_NEXT, 0) * b.take(_LAST, 0) - a.take(_LAST, 0) * b.take(_NEXT, 0)
 
 
 def rotate_frames(rot: Array, vectors: Array) -> Array:
-    """Attitudes (3, 3, n) turned about `vectors` (3, n) in body axes by angles of 2 atan(|v| / 2), about |v|."""
+    """Rotate attitudes (3, 3, n) about `vectors` v (3, n) in body axes by angles of 2 atan(|v| / 2), about |v|."""
     half = 0.5 * vectors
     square = half * half
     factor = 2.0 / (1.0 + (square[0] + square[1] + square[2]))

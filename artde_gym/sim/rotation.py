@@ -1,4 +1,4 @@
-"""Rotations in plain floats, several times as fast as NumPy for a single vector: they run every step."""
+"""Rotations with plain floats, which are several times faster than NumPy for a single vector."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from artde_gym.multibody.spec import Vector
 Number = TypeVar("Number", float, Array)
 
 Quaternion: TypeAlias = tuple[float, float, float, float]
-"""x, y, z, w: the vector part first, as SciPy and PyBullet have it."""
+"""x, y, z, w: the vector part first, as in SciPy and PyBullet."""
 
 
 def rotate(
     vector: tuple[Number, Number, Number], quat_xyzw: tuple[Number, Number, Number, Number]
 ) -> tuple[Number, Number, Number]:
-    """R(quat) vector = v + w t + u x t with t = 2 u x v, u and w being the parts of the quaternion; elementwise."""
+    """Return R(quat) v = v + w t + u x t with t = 2 u x v and the quaternion's parts u and w; elementwise."""
     (x, y, z, w), (vx, vy, vz) = quat_xyzw, vector
     tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
     return vx + w * tx + y * tz - z * ty, vy + w * ty + z * tx - x * tz, vz + w * tz + x * ty - y * tx
 
 
 def point_velocity(velocity: Vector, spin: Vector, arm: Vector) -> Vector:
-    """Velocity v + w x r of a body's point at `arm` from the point that has `velocity`."""
+    """Return the velocity v + w x r of a body's point at `arm` from the point that has `velocity`."""
     (vx, vy, vz), (wx, wy, wz), (ax, ay, az) = velocity, spin, arm
     return vx + wy * az - wz * ay, vy + wz * ax - wx * az, vz + wx * ay - wy * ax
 
 
 def matrix(quat_xyzw: Quaternion) -> tuple[float, float, float, float, float, float, float, float, float]:
-    """R(quat), row by row."""
+    """Return R(quat) row by row."""
     x, y, z, w = quat_xyzw
     x2, y2, z2 = x + x, y + y, z + z
     xx, yy, zz, xy, xz, yz = x * x2, y * y2, z * z2, x * y2, x * z2, y * z2
@@ -44,14 +44,14 @@ def roll_pitch(
     arctangent: Callable[[Number, Number], Number],
     arcsine: Callable[[Number], Number],
 ) -> tuple[Number, Number]:
-    """Angles (rad) of roll about x and pitch about y, the last two of the turns about z, y and x that make R(quat).
+    """Return roll about x and pitch about y (rad) of R(quat) = R_z(yaw) R_y(pitch) R_x(roll).
 
-    `arctangent` and `arcsine` are those for this kind of number; see `arcsine` below.
+    `arctangent` and `arcsine` are functions for this type of number; see `arcsine` below.
     """
     x, y, z, w = quat_xyzw
     return arctangent(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)), arcsine(2 * (w * y - z * x))
 
 
 def arcsine(value: float) -> float:
-    """`math.asin`, of values too that rounding has led beyond 1."""
+    """Return `math.asin` of a value that rounding may have taken beyond 1."""
     return math.asin(max(-1.0, min(1.0, value)))

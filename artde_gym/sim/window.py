@@ -1,4 +1,4 @@
-"""A window to look at a robot in: Bullet's where PyBullet is, else MuJoCo's."""
+"""The window of live play: Bullet's if PyBullet is installed, else MuJoCo's."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ if TYPE_CHECKING:
 
 
 def open_window() -> BulletWindow | MujocoWindow:
-    """Open a window; before the first engine of a process, since Bullet's stays black beside an older client.
+    """Open a window; call before making an engine, since Bullet's window stays black beside an older client.
 
     Raises:
-        OptionError: without a display, or without OpenGL on it.
+        OptionError: without a display with OpenGL.
     """
     if missing_bullet():
         from artde_gym.sim.mujoco_window import MujocoWindow

@@ -146,7 +146,7 @@ def outcomes(result: Result) -> dict[str, str]:
 def test_the_quadrotors_claims() -> None:
     """With ARTDE's errors at 60 % of ATDE's and 80 % of ASMC's, and worse than a TDE that does not adapt."""
     verdicts = outcomes(flights({"artde": 0.6, "atde": 1.0, "asmc": 0.75, "tde": 0.7, "tde+kd": 0.5}))
-    assert verdicts["nobody crashes"] == "holds"
+    assert verdicts["no controller crashes"] == "holds"
     better = {claim: verdict for claim, verdict in verdicts.items() if "by more than 30 %" in claim}
     assert {claim.split("'s ")[1].split()[-1]: verdict for claim, verdict in better.items()} == {
         "ATDE": "holds",
@@ -157,7 +157,7 @@ def test_the_quadrotors_claims() -> None:
             assert verdict == "holds", claim
     assert [verdicts[claim] for claim in verdicts if claim.startswith("adaptation")] == ["holds", "does not hold"]
     crashed = outcomes(flights({"artde": 0.6, "atde": 1.0, "asmc": 0.75}, crash="artde"))
-    assert crashed["nobody crashes"] == "does not hold"
+    assert crashed["no controller crashes"] == "does not hold"
     assert crashed["ARTDE sways less than ATDE after the payload's drop (peak error)"] == "not measured"
     (calm,) = outcomes(flights({"artde": 3.0, "atde": 2.0, "tde": 1.0}, scenario="Q1-calm")).values()
     assert calm == "does not hold"

@@ -57,7 +57,7 @@ def test_no_check_ends_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
     outcome = doctor("--checks", "raises,files")
     assert outcome.exit_code == 1
     assert "FAILED" in outcome.output
-    assert "results folder: runs/ can be written" in outcome.output
+    assert "results folder: runs/ is writable" in outcome.output
     assert max(map(len, outcome.output.splitlines())) <= 80
     with pytest.raises(UnknownNameError, match="did you mean 'files'"):
         list(run_checks(["fles"]))

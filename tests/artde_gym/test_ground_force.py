@@ -113,14 +113,14 @@ def test_the_pulse_changes_the_walk_from_the_landing_on() -> None:
 
 def test_scenarios_with_the_thesis_force_say_what_they_are() -> None:
     for base in ("S1", "S2", "S3"):
-        assert "leaves the thesis' ground force out" in scenario(base).text
+        assert "omits the thesis' ground force" in scenario(base).text
         for percent in (33, 45, 50):
             entry = scenario(f"{base}-GRF{percent}")
             pulse = entry.disturbances["grf_pulse"]
             assert pulse == {"shape": "double_hump", "share": percent / 100, "duration": 1.0, "trigger": "contact"}
             assert {k: v for k, v in entry.disturbances.items() if k != "grf_pulse"} == scenario(base).disturbances
             assert (entry.env_id, entry.phases) == (scenario(base).env_id, scenario(base).phases)
-            fitted = "fitted: where the pattern appears in MuJoCo; not confirmed in Bullet" in entry.text
+            fitted = "fitted to the thesis' falls in MuJoCo; not confirmed in Bullet" in entry.text
             assert fitted == (percent == 45)
     assert "S1-GRF" not in SCENARIOS
     with pytest.raises(UnknownNameError, match="S1-GRF33"):

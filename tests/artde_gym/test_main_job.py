@@ -11,7 +11,7 @@ from artde_gym.evaluation import evaluate
 
 @pytest.mark.slow
 def test_all_three_walk_and_artde_tracks_best() -> None:
-    """S1 at 1 ms, 58 s: nobody falls; ARTDE (as printed, gamma 500) has 30 % less RMSE than TDE on q3, q4, q5."""
+    """S1 (1 ms, 58 s): no controller falls; ARTDE (as printed, gamma 500) has 30 % less RMSE than TDE on q3, q4, q5."""
     result = evaluate(["tde", "atde", "artde"], scenario="S1", episodes=1)
     assert not any(result.episodes["fell"])
     assert result.episodes["duration_s"].tolist() == pytest.approx([58.0] * 3)

@@ -87,7 +87,7 @@ def test_a_scenario_of_another_robot_is_refused(scenario: str, tmp_path: Path) -
     line = f"reproduce --robot quadrotor --scenario {scenario} --episodes 1 --out {tmp_path / 'x'}"
     answer = CliRunner().invoke(app, line.split())
     assert isinstance(answer.exception, OptionError)
-    assert str(answer.exception) == "scenario is 'S1'; allowed: one of the robot's, which is 'quadrotor'"
+    assert str(answer.exception) == "scenario is 'S1'; allowed: a scenario of the robot 'quadrotor'"
     assert not (tmp_path / "x").exists()
 
 

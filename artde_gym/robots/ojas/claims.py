@@ -1,4 +1,4 @@
-"""The thesis' claims of Ojas, and the questions that we add."""
+"""The thesis' claims about Ojas, and this project's own questions."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def _falls(suffix: str, said: str, period: str = "") -> tuple[Claim, ...]:
     s1, s2, s3 = (f"{name}{suffix}" for name in ("S1", "S2", "S3"))
     times = "1 ms" if period else "26 s, 31 s, walks"
     return (
-        Claim(s1, f"{said}nobody falls", period or "nobody falls", falls(s1, _WALK)),
+        Claim(s1, f"{said}no controller falls", period or "no controller falls", falls(s1, _WALK)),
         Claim(s2, f"{said}TDE and ATDE fall with the payload, ARTDE does not", times, falls(s2, _FALL)),
         Claim(s3, f"{said}ARTDE survives both pushes", period or "walks", falls(s3, {"artde": False})),
     )
@@ -79,7 +79,7 @@ CLAIMS: tuple[Claim, ...] = (
     *(
         Claim(
             f"{name}{suffix}",
-            "adaptation adds to the equivalent extra stiffness (ARTDE against tde+kd)",
+            "adaptation improves on the equivalent extra stiffness (ARTDE against tde+kd)",
             "ours",
             adapts(f"{name}{suffix}", "tde+kd", "rmse_deg"),
             ablation=True,

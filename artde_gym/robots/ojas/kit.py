@@ -1,11 +1,11 @@
-"""What a plug-in says of Ojas: its environments, scenarios and frontiers, and how it is shown.
+"""Plug-in of Ojas: its environments, scenarios, frontiers and presentation.
 
-Each scenario varies by a kick on the torso of 0.5 to 5 N for 0.2 s at 1 s from any side, friction of 0.7 to 0.9, and a
-payload up to 1 cm off its place.
+Each scenario varies a push on the torso (0.5 to 5 N for 0.2 s at 1 s, from any side), the friction (0.7 to 0.9) and the
+payload's position (by up to 1 cm).
 
-The thesis applies a ground reaction force in all of its scenarios; S1 to S3 leave it out. S1-GRF33 to S3-GRF50 add it,
-a double hump of 1 s from each landing, of 33, 45 or 50 % of the weight of the robot as specified. The 45 % are fitted:
-where the thesis' pattern of falls appears in MuJoCo; not confirmed in Bullet. 33 and 50 % lie on either side.
+The thesis applies a ground reaction force in all of its scenarios; S1 to S3 omit it. S1-GRF33 to S3-GRF50 add it, a
+double hump of 1 s from each landing, of 33, 45 or 50 % of the robot's nominal weight. 45 % is fitted to the thesis'
+pattern of falls in MuJoCo; it is not confirmed in Bullet. 33 and 50 % bracket it.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ _SLOW = {"control_period": 0.004}
 _S2 = {"payload": _PAYLOAD, **_VARIATION}
 _S3 = {**_S2, "push": [_KICK, CHEST_PUSH, ARM_PUSH]}
 _PHASES = ((0.0, 28.0), (28.0, 37.0), (37.0, math.inf))
-_LEFT_OUT = "leaves the thesis' ground force out"
+_LEFT_OUT = "omits the thesis' ground force"
 _PUSHES = f"walk with a payload, pushes of 10 N at 28 s (chest) and 37 s (left arm); {_LEFT_OUT}"
-_FITTED = "; fitted: where the pattern appears in MuJoCo; not confirmed in Bullet"
+_FITTED = " (fitted to the thesis' falls in MuJoCo; not confirmed in Bullet)"
 
 
 def _with_ground_force(name: str, percent: int) -> Scenario:
-    """Return S1, S2 or S3 with the thesis' ground force, of a size in percent of the weight."""
+    """Return S1, S2 or S3 with the thesis' ground force, in percent of the weight."""
     env_id, disturbances, phases = {"S1": (_WALK, _VARIATION, ()), "S2": (_WALK, _S2, ()), "S3": (_PUSH, _S3, _PHASES)}[
         name
     ]
@@ -61,7 +61,7 @@ _SCENARIOS = (
     *(_with_ground_force(name, percent) for name in ("S1", "S2", "S3") for percent in (33, 45, 50)),
 )
 
-_STRIDE = (5.0, 7.0)  # s, two steps of steady walking at 1 s a step
+_STRIDE = (5.0, 7.0)  # s, two steps of 1 s in steady walking
 _FRONTIER = FrontierTest(
     scenario="S2",
     duration=12.0,

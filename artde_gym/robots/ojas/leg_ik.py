@@ -12,14 +12,14 @@ from artde_gym.errors import RobotError
 
 
 def leg_angles(ankle_from_hip: Array, thigh: float, shank: float, rot_foot_to_base: Array | None = None) -> Array:
-    """Hip yaw, roll, pitch, knee, ankle pitch, ankle roll (..., 6) (rad), knee bent forward (>= 0).
+    """Return hip yaw, roll, pitch, knee, ankle pitch, ankle roll (..., 6) (rad), knee bent forward (>= 0).
 
     Args:
         ankle_from_hip: ankle minus hip, in base axes, (..., 3) (m).
-        rot_foot_to_base: orientation of the foot, (..., 3, 3); level and straight ahead where left out.
+        rot_foot_to_base: orientation of the foot, (..., 3, 3); level and straight ahead by default.
 
     Raises:
-        RobotError: where the ankle is out of the leg's reach.
+        RobotError: if the ankle is out of the leg's reach.
     """
     rot_foot = np.eye(3) if rot_foot_to_base is None else rot_foot_to_base
     r = -(np.swapaxes(rot_foot, -1, -2) @ ankle_from_hip[..., None])[..., 0]  # hip from ankle, in foot axes
@@ -49,7 +49,7 @@ def _about_y(angle: Array) -> Array:
 
 
 def _turn(angle: Array, i: int, j: int) -> Array:
-    """Rotation in the plane of the coordinate axes i, j, from i to j."""
+    """Return the rotation in the plane of the coordinate axes i, j, from i to j."""
     rot = np.zeros((*np.shape(angle), 3, 3))
     rot[..., range(3), range(3)] = 1.0
     rot[..., i, i] = rot[..., j, j] = np.cos(angle)

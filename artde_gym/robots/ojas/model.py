@@ -1,6 +1,6 @@
 """Ojas, the 20-joint humanoid of the thesis: 8.986 kg, 0.94 m.
 
-The thesis gives mass, height and the joints; the distribution over the links is ours (`docs/deviations.md`).
+The thesis gives mass, height and joints; the distribution over the links is this project's (`docs/deviations.md`).
 Base frame: at the middle of the hip line; x forward, y left, z up. Leg joints q1..q6: hip yaw (z), hip roll (x),
 hip pitch (y), knee (y), ankle pitch (y), ankle roll (x); hip axes intersect, ankle axes intersect.
 """
@@ -23,10 +23,10 @@ SHANK = 0.20  # m, knee to ankle
 ANKLE_HEIGHT = 0.05  # m, ankle to sole
 HIP_OFFSET = 0.065  # m, hip to the middle of the hip line
 FOOT_SIZE: Vector = (0.20, 0.11, 0.02)
-FOOT_CENTER_AHEAD = 0.02  # m, middle of the foot ahead of the ankle
+FOOT_CENTER_AHEAD = 0.02  # m, from the ankle forward to the center of the foot
 TORSO_CENTER: Vector = (0.0, 0.0, 0.16)
 TORQUE_LIMIT = 40.0  # Nm
-ARMATURE = 0.045  # kg m^2, of a rotor and its gear, reflected to each leg joint
+ARMATURE = 0.045  # kg m^2, inertia of rotor and gear reflected to each leg joint
 GEAR_RATIO = 10.0
 LUMPED_ARMATURE = (0.08, 0.08, 0.08, 0.12, 0.08, 0.05)  # kg m^2, discs for q1..q6
 LUMPED_BASE_INERTIA = 0.03  # kg m^2
@@ -46,11 +46,11 @@ _LIGHT = (0.85, 0.86, 0.88, 1.0)
 
 @functools.cache
 def ojas(actuator_inertia: ActuatorInertia = "rotor", *, arms: Literal["fixed", "revolute"] = "fixed") -> RobotSpec:
-    """Ojas with one of its actuator models.
+    """Return Ojas with one of its actuator models.
 
     Args:
-        actuator_inertia: "rotor", geared rotors whose inertia the joints feel; "lumped", discs on the child links,
-            faster to simulate in Bullet; "none", bare links: then eig(M^-1 m_bar) leaves (0, 2) and TDE diverges.
+        actuator_inertia: "rotor", reflected inertia of geared rotors; "lumped", discs on the child links, faster to
+            simulate in Bullet; "none", bare links: then eig(M^-1 m_bar) leaves (0, 2) and TDE diverges.
         arms: "fixed" as in the thesis' experiments (12 joints move), or "revolute" (all 20).
 
     Raises:

@@ -1,4 +1,4 @@
-"""The two pushes of the thesis' scenario S3, which gives neither a duration (0.2 s here) nor the arm push's azimuth."""
+"""The two pushes of scenario S3; the thesis gives neither a duration (0.2 s here) nor the arm push's azimuth."""
 
 from __future__ import annotations
 

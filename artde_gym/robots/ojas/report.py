@@ -1,4 +1,4 @@
-"""Figures of the walk: what the feet and the joints are meant to do, what the ground gives back, the tilt."""
+"""Figures of the walk: references of the feet and joints, ground reaction forces, and the tilt."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from artde_gym.report.signals import add, over_time
 from artde_gym.robots.ojas.model import ojas
 from artde_gym.robots.ojas.walking import walking_pattern
 
-SHOWN = 10.0  # s of the walk, from its start
+SHOWN_DURATION = 10.0  # s of the walk, from its start
 SIDES: dict[str, Style] = {"left": OTHERS[3], "right": OTHERS[4]}
 BODY = {"center of mass": OTHERS[2], **{f"{side} foot": look for side, look in SIDES.items()}}
-PERIOD = 0.001  # s, of the pattern in the environment
+PERIOD = 0.001  # s, sampling period of the pattern
 
 
 _JOINTS: tuple[Block, ...] = (
@@ -44,32 +44,32 @@ _JOINT_WIRES = (
 
 
 def figures(episode: Episode) -> list[str]:
-    """The ground's force and the tilt of one episode."""
+    """Return figures of the ground's force and the tilt in one episode."""
     return [_ground(episode), _tilt(episode)]
 
 
 def pattern_of(kwargs: Mapping[str, Any]) -> dict[str, Any]:
-    """The arguments of the walking pattern among those of an environment."""
+    """Return the arguments of the walking pattern among those of an environment."""
     known = inspect.signature(walking_pattern).parameters
     return {name: value for name, value in kwargs.items() if name in known}
 
 
 def loop() -> str:
     """Return the block diagram of one loop for all joints."""
-    name = "Block diagram: reference, law with adaptation, robot, and the estimate of one sample ago"
+    name = "Block diagram: reference, law with adaptation, robot, and the estimate of one step ago"
     return diagram(name, 190, _JOINTS, _JOINT_WIRES)
 
 
 def reference(kwargs: Mapping[str, Any]) -> dict[str, list[str]]:
-    """Return the loop, and the walking pattern of an environment's arguments."""
+    """Return figures of the loop and of the walking pattern for an environment's arguments."""
     arguments = pattern_of(kwargs)
     return {"ojas": [loop()], f"pattern {json.dumps(arguments)}": _pattern(arguments)}
 
 
 def _pattern(arguments: Mapping[str, Any]) -> list[str]:
-    """What the pattern wants of the center of mass, the feet and the joints."""
+    """Return figures of the reference of the center of mass, the feet and the joints."""
     pattern = walking_pattern(**arguments, period=PERIOD)
-    part = slice(0, round(SHOWN / PERIOD), 10)
+    part = slice(0, round(SHOWN_DURATION / PERIOD), 10)
     time = PERIOD * np.arange(len(pattern.q))[part]
     com = pattern.base[part] + RigidBodyTree(ojas("none")).center_of_mass(pattern.q[part])
     paths = {"center of mass": com, "left foot": pattern.feet[part, 0], "right foot": pattern.feet[part, 1]}
@@ -88,7 +88,7 @@ def _pattern(arguments: Mapping[str, Any]) -> list[str]:
         for side, column in columns.items():
             chart.line(time, column, SIDES[side], text=side)
         joints[f"q{i + 1}"] = chart.svg()
-    first = f"the first {min(SHOWN, float(time[-1])):.0f} s"
+    first = f"the first {min(SHOWN_DURATION, float(time[-1])):.0f} s"
     return [
         figure(f"Desired trajectories of the center of mass and the ankles, {first}.", trajectories, BODY),
         figure(f"Desired joint trajectories of both legs, {first}.", joints, SIDES),
@@ -96,21 +96,21 @@ def _pattern(arguments: Mapping[str, Any]) -> list[str]:
 
 
 def _ground(episode: Episode) -> str:
-    """Vertical force of the ground on each foot, one chart a controller."""
+    """Return a figure of the ground's vertical force on each foot, one chart per controller."""
     charts = {}
     for name, signals in episode.signals.items():
         loads = _loads(signals)
         if loads is None:
             continue
         time = signals.time[: len(loads)]
-        chosen = time <= SHOWN
+        chosen = time <= SHOWN_DURATION
         chart = _chart(f"Ground reaction force under {name}", "force (N)", time[chosen], [loads[chosen]])
         for i, side in enumerate(SIDES):
             chart.line(time[chosen], loads[chosen, i], SIDES[side], text=side)
         charts[name] = chart.svg()
     if not charts:
         return paragraph("Ground reaction forces are not among the stored signals of this run.", "soft")
-    return figure(f"Ground reaction force on each leg, vertical, the first {SHOWN:.0f} s.", charts, SIDES)
+    return figure(f"Ground reaction force on each leg, vertical, the first {SHOWN_DURATION:.0f} s.", charts, SIDES)
 
 
 def _loads(signals: Signals) -> Array | None:
@@ -122,7 +122,7 @@ def _loads(signals: Signals) -> Array | None:
 
 
 def _tilt(episode: Episode) -> str:
-    """How far the torso leans: what a fall begins with."""
+    """Return a figure of the torso's tilt, the first sign of a fall."""
     tilts = {name: np.degrees(np.linalg.norm(s.fields["tilt"], axis=-1)) for name, s in episode.signals.items()}
     chart = over_time(episode, "Tilt of the torso", "tilt (deg)", list(tilts.values()), zero=True)
     for name, tilt in tilts.items():

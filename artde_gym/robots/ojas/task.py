@@ -1,4 +1,4 @@
-"""What the single and the batched biped share: layouts, reward, end of an episode, the walk, documentation."""
+"""Walking task of Ojas for single and vector environments: layouts, reward, termination, walk and documentation."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ from artde_gym.sim.engine import World
 Arms = Literal["fixed", "revolute"]
 
 TIME_STEP = 0.001  # s, of the physics
-FRICTION = 0.8  # of feet and ground
+FRICTION = 0.8  # coefficient between feet and ground
 FALL_TILT_DEG = 35.0
-FALL_HEIGHT = 0.25  # m, of the base; the hips walk at 0.395 m or higher
-SETTLE_STEPS = 300  # of the physics, before the first step, for feet and payload to come to rest
-SETTLE_POSE_STEPS = 1000  # likewise on a slope or in another pose, where the robot rocks first
-SETTLE_STIFFNESS = 420.0  # Nm/rad: what TDE at 1 ms has, Kd m_bar / L
+FALL_HEIGHT = 0.25  # m, of the base; while walking, the hips are at 0.395 m or higher
+SETTLE_STEPS = 300  # physics steps before the first control period, in which feet and payload settle
+SETTLE_POSE_STEPS = 1000  # the same on a slope or in another pose, where the robot rocks first
+SETTLE_STIFFNESS = 420.0  # Nm/rad, that of TDE at 1 ms, Kd m_bar / L
 SETTLE_DAMPING = 10.0  # Nm s/rad
-BARE_DAMPING = 0.5  # Nm s/rad, likewise without rotors: held for a step, more than 2 M / TIME_STEP of a foot diverges
+BARE_DAMPING = 0.5  # Nm s/rad, without rotors: held for a step, more than 2 M / TIME_STEP diverges for a foot
 MAX_SPEED = 200.0  # rad/s, bound of observed joint speeds
 
 N_JOINTS = 12
@@ -53,14 +53,14 @@ OBSERVATION = Layout(
             "Nm",
             -robot.TORQUE_LIMIT,
             robot.TORQUE_LIMIT,
-            "torques really applied over the last control period",
+            "torques applied over the last control period",
         ),
         Field("base_height", 1, "m", -1.0, 2.0, "base origin (middle of the hip line) above the ground"),
         Field("tilt", 2, "rad", -math.pi, math.pi, "roll about x and pitch about y of the base"),
-        Field("base_velocity", 3, "m/s", -100.0, 100.0, "of the base origin, world axes"),
-        Field("base_angular_velocity", 3, "rad/s", -MAX_SPEED, MAX_SPEED, "of the base, world axes"),
-        Field("contact", 2, "1", 0.0, 1.0, "1 where the left, right foot carries more than 1 N"),
-        Field("load_left_ref", 1, "1", 0.0, 1.0, "share of the weight that the pattern puts on the left foot"),
+        Field("base_velocity", 3, "m/s", -100.0, 100.0, "velocity of the base origin, world axes"),
+        Field("base_angular_velocity", 3, "rad/s", -MAX_SPEED, MAX_SPEED, "angular velocity of the base, world axes"),
+        Field("contact", 2, "1", 0.0, 1.0, "1 if the left, right foot carries more than 1 N"),
+        Field("load_left_ref", 1, "1", 0.0, 1.0, "planned share of the weight on the left foot"),
         Field("phase", 1, "1", 0.0, 1.0, "progress within a stride of two steps; 0 while standing"),
     )
 )
@@ -71,7 +71,7 @@ ACTION = Layout(
     (Field("tau", N_JOINTS, "Nm", -robot.TORQUE_LIMIT, robot.TORQUE_LIMIT, "leg joint torques, left then right"),)
 )
 
-_RIGHT_LEG = {f"q{i + 1}": N_JOINTS // 2 + i for i in range(N_JOINTS // 2)}  # what the thesis' tables show
+_RIGHT_LEG = {f"q{i + 1}": N_JOINTS // 2 + i for i in range(N_JOINTS // 2)}  # as in the thesis' tables
 METRICS_SPEC = MetricsSpec(
     errors=(TrackedSignal("deg", 180.0 / math.pi, _RIGHT_LEG, lambda fields: fields["q_ref"] - fields["q"]),),
     norm=False,
@@ -107,10 +107,10 @@ hip pitch, knee, ankle pitch, ankle roll. Held for one control period; clipped t
 ## Observation
 {observation}
 
-`tau_applied` is what really acted, after saturation: the time-delay estimate needs just that.
+`tau_applied` are the torques that acted, after saturation, as needed by the time-delay estimate.
 
 ## Reward
-Over a control period L, L times the sum of scale x term; each term is in `info`, as `reward_alive` and so on:
+For a control period L, L times the sum of scale x term; `info` has each term (`reward_alive`, ...):
 
 | term | scale | value |
 |---|---|---|
@@ -123,42 +123,41 @@ Over a control period L, L times the sum of scale x term; each term is in `info`
 A walk of 58 s without an error earns a little under 203.
 
 ## Start
-The robot stands on both feet in the pattern's first pose, at rest, in balance with its payload.
+The robot stands on both feet in the pattern's first pose, at rest, in equilibrium with its payload.
 
 ## End
-*Terminated* when it has fallen: tilt above 35 degrees (`info["fell_tilt"]`), base below 0.25 m
-(`fell_height`), or joint speeds whose norm passes 200 rad/s (`fell_speed`: it has diverged). *Truncated* at the end of
-the walk.
+*Terminated* by a fall: tilt above 35 degrees (`info["fell_tilt"]`), base below 0.25 m (`fell_height`), or joint speeds
+with a norm above 200 rad/s (`fell_speed`: the motion has diverged). *Truncated* at the end of the walk.
 
 ## Arguments
 | name | default | allowed | meaning |
 |---|---|---|---|
-| `disturbances` | {default} | see `artde_gym.disturbances` | what happens besides; `{{}}` for nothing |
-| `control_period` | 0.001 | whole multiples of 0.001 s up to 0.05 | time between two actions, L |
-| `actuator_inertia` | "rotor" | "rotor", "lumped", "none" | geared rotors, discs (3x faster), nothing |
-| `arms` | "fixed" | "fixed", "revolute" | all 20 joints with "revolute": arms held by motors |
-| `self_collision` | False | False, True | whether the feet stop each other, or overlap |
+| `disturbances` | {default} | see `artde_gym.disturbances` | disturbances; `{{}}` for none |
+| `control_period` | 0.001 | whole multiples of 0.001 s up to 0.05 | control period L |
+| `actuator_inertia` | "rotor" | "rotor", "lumped", "none" | geared rotors, discs (3x faster), none |
+| `arms` | "fixed" | "fixed", "revolute" | "revolute": all 20 joints, with arms held by motors |
+| `self_collision` | False | False, True | whether the feet collide or overlap |
 | `speed` | 0.1 | 0 to 0.25 m/s | walking speed |
-| `step_duration` | 1.0 | 0.6 to 2 s | time of one step |
-| `duration` | 58.0 | 0.1 to 1800 s | length of the walk |
+| `step_duration` | 1.0 | 0.6 to 2 s | duration of one step |
+| `duration` | 58.0 | 0.1 to 1800 s | duration of the walk |
 | `observe_ground_force` | False | False, True | append the ground's force on each foot to the observation |"""
-"""What all pages share, with `{observation}` and `{default}` to be filled in; arguments of their own follow."""
+"""Text of all pages, with `{observation}` and `{default}` to be filled in; further arguments follow."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Walk:
-    """What is the same in all episodes of an environment.
+    """Everything that is the same in all episodes of an environment.
 
     Attributes:
-        nominal_robot: as controllers know it.
-        robot: as it is simulated.
-        pattern: what is walked.
-        substeps: physics steps of a control period.
-        plan: what the observation takes from the pattern, one row a control period: (samples, 38).
-        position: of the base at the start (m), the robot standing upright.
+        nominal_robot: model known to controllers.
+        robot: simulated model.
+        pattern: walking pattern.
+        substeps: physics steps per control period.
+        plan: references in the observation, one row per control period: (samples, 38).
+        position: position of the base at the start (m), with the robot upright.
         stand: joint torques (12,) (Nm) that balance the pattern's first pose.
-        damping: of the joints while the robot settles (Nm s/rad).
-        arguments: of which it was made.
+        damping: damping of the joints while the robot settles (Nm s/rad).
+        arguments: arguments of `of`.
     """
 
     nominal_robot: RobotSpec
@@ -182,7 +181,7 @@ class Walk:
         step_duration: float,
         duration: float,
     ) -> Walk:
-        """From the arguments of an environment.
+        """Build it from the arguments of an environment.
 
         Raises:
             OptionError: for an argument out of range.
@@ -205,10 +204,10 @@ class Walk:
         return cls(nominal, model, pattern, substeps, plan, place, stand, damping, arguments)
 
     def __deepcopy__(self, _: dict[int, Any]) -> Walk:
-        return self  # nothing of it changes
+        return self  # immutable
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Walk.of, self.arguments  # a thousandth of what they make
+        return Walk.of, self.arguments  # a thousandth of the data
 
     @property
     def start(self) -> Array:
@@ -221,7 +220,7 @@ class Walk:
 
     @property
     def last(self) -> int:
-        """The control period with which the walk ends."""
+        """Index of the walk's last control period."""
         return len(self.plan) - 1
 
     @property
@@ -230,7 +229,7 @@ class Walk:
         return {"site": tuple(name for name, _, _ in self.robot.sites), "joint": self.nominal_robot.actuated}
 
     def parse(self, disturbances: Mapping[str, Any]) -> Disturbances:
-        """Read disturbances of this robot."""
+        """Parse disturbances of this robot."""
         parsed = Disturbances.parse(disturbances, self.words["site"], self.words["joint"], self.nominal_robot.name)
         if not any(self.nominal_robot.armature) and any(kind == "rotor_inertia" for kind, _ in parsed.entries):
             allowed = "actuator_inertia='rotor' beside it: discs and bare links have no rotors"
@@ -238,7 +237,7 @@ class Walk:
         return parsed
 
     def set_up(self, world: World, sampled: Mapping[str, Any]) -> None:
-        """Give a world what was drawn for it, the payload excepted."""
+        """Apply sampled disturbances to a world, except the payload."""
         world.set_friction(sampled.get("friction", {}).get("coefficient", FRICTION))
         world.set_gravity(gravity(**sampled.get("slope", {})))
         factor = sampled.get("mass_scale", {}).get("factor", 1.0)
@@ -247,7 +246,7 @@ class Walk:
         world.set_contact_time(sampled.get("contact", {}).get("time_constant"))
 
     def _mass_factors(self, sampled: Mapping[str, Any]) -> dict[str, float]:
-        """Factors of the masses of links, by name: legs of another mass, and the rest of the robot makes up for it."""
+        """Return factors of the links' masses by name; the rest of the robot compensates for the legs' masses."""
         if "mass_distribution" not in sampled:
             return {}
         legs = sampled["mass_distribution"]["legs"]
@@ -257,32 +256,32 @@ class Walk:
         return {name: legs if name in self.robot.actuated else rest for name in masses}
 
     def pulses(self, n: int) -> GrfPulses:
-        """The ground reaction pulses of `n` robots on this walk."""
+        """Return the ground reaction pulses of `n` robots on this walk."""
         return GrfPulses(n, self.pattern.load_left, TIME_STEP)
 
     def pose(self, sampled: Mapping[str, Any]) -> Array:
-        """Joint angles (12,) (rad) in which the robot is to settle."""
+        """Return joint angles (12,) (rad) in which the robot settles."""
         pose = self.start.copy()
         for entry in sampled.get("initial_pose", ()):
             pose[self.nominal_robot.actuated.index(entry["joint"])] += entry["offset"]
         return pose
 
     def hold(self, pose: Array, q: Array, qd: Array) -> Array:
-        """Torques (..., 12) (Nm) of springs on the joints, under which the robot settles in a pose.
+        """Return torques (..., 12) (Nm) of joint springs with which the robot settles in a pose.
 
-        Springs share the load of the two legs evenly. A rigid hold would not: the legs and the ground are a closed
-        chain, in which any start error turns into antagonistic torques of several Nm.
+        Springs share the load evenly between the legs. A rigid hold would not: legs and ground are a closed chain, in
+        which any initial error causes antagonistic torques of several Nm.
         """
         return self.stand + SETTLE_STIFFNESS * (pose - q) - self.damping * qd
 
 
 def torque_limit(sampled: Mapping[str, Any]) -> float:
-    """The largest torque (Nm) of a joint with what was drawn."""
+    """Return the largest torque (Nm) of a joint for sampled disturbances."""
     return sampled.get("torque_limit", {}).get("limit", robot.TORQUE_LIMIT)
 
 
 def settling(sampled: Mapping[str, Any]) -> int:
-    """Time steps that a robot at rest on level ground needs to come to rest again with what was drawn."""
+    """Return the time steps that a robot at rest on level ground needs to settle with sampled disturbances."""
     if not sampled.keys().isdisjoint(("slope", "initial_pose")):
         return SETTLE_POSE_STEPS
     return (
@@ -295,13 +294,13 @@ def settling(sampled: Mapping[str, Any]) -> int:
 def reward_terms(
     error: Number, tilt: Number, effort: Number, change: Number, exp: Callable[[Number], Number]
 ) -> dict[str, Number]:
-    """The reward's terms in the order of `REWARD_SCALES`, elementwise.
+    """Return the reward's terms in the order of `REWARD_SCALES`, elementwise.
 
     Args:
         error: squared norm of the tracking error (rad^2).
         tilt: squared angle of the tilt (rad^2).
-        effort, change: squared norms of the torques and of what they changed in a control period (Nm^2).
-        exp: the exponential function for this kind of number.
+        effort, change: squared norms of the torques and of their change in a control period (Nm^2).
+        exp: the exponential function for this type of number.
     """
     return {
         "alive": 0.0 * tilt + 1.0,
@@ -313,25 +312,25 @@ def reward_terms(
 
 
 def falls(quat_xyzw: tuple[Number, Number, Number, Number], height: Number, speed: Number) -> tuple[Any, Any, Any]:
-    """Whether each of `FALL_REASONS` holds, elementwise; a state that is no number any more has fallen.
+    """Return which of `FALL_REASONS` hold, elementwise; a state with NaN has fallen.
 
     Args:
         quat_xyzw: attitude of the base.
-        height: of the base (m).
+        height: height of the base (m).
         speed: squared norm of the joint velocities (rad^2/s^2).
     """
     x, y, _, _ = quat_xyzw
-    up = 1.0 - 2.0 * (x * x + y * y)  # the world's z component of the base's z axis
+    up = 1.0 - 2.0 * (x * x + y * y)  # world z component of the base's z axis
     return (up >= _COS_FALL) ^ True, height < FALL_HEIGHT, (speed <= MAX_SPEED * MAX_SPEED) ^ True
 
 
 def observation_layout(ground_force: bool) -> Layout:
-    """The observation, with the ground's force on each foot or without."""
+    """Return the observation's layout, with or without the ground's force on each foot."""
     return Layout((*OBSERVATION.fields, GROUND_FORCE)) if ground_force else OBSERVATION
 
 
 def gravity(pitch_deg: float = 0.0, roll_deg: float = 0.0) -> Vector:
-    """Free fall in the axes of a ground that rises by `pitch_deg` ahead and by `roll_deg` to the left."""
+    """Return gravity (m/s^2) in the axes of a ground that rises by `pitch_deg` forward and `roll_deg` to the left."""
     ahead, left = math.tan(math.radians(pitch_deg)), math.tan(math.radians(roll_deg))
     size = GRAVITY / math.sqrt(1.0 + ahead * ahead + left * left)
     return (-size * ahead, -size * left, -size)

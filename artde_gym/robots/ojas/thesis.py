@@ -1,4 +1,4 @@
-"""What Dantu 2023 reports of Ojas, number by number, to be printed beside ours.
+"""Results of Ojas published by Dantu 2023, for comparison.
 
 The tables' "MAE" is the maximum absolute error. S1 lists for ARTDE's q3 a maximum (1.447) below the RMS value (1.455);
 the number is kept as printed.
@@ -58,4 +58,4 @@ REPORTED = {
     "S2": Reported("Table 2.2", _S2, {"tde": 26.0, "atde": 31.0}),
     "S3": Reported("Table 2.3", _S3),
 }
-"""By scenario."""
+"""Published results by scenario."""

@@ -1,12 +1,12 @@
-"""The walking pattern of Ojas: stand, start, walk, stop, as joint positions, velocities and accelerations.
+"""Walking pattern of Ojas: stand, start, walk, stop, as joint positions, velocities and accelerations.
 
-1. Footholds and a zero-moment-point (ZMP) reference: on the middle of the supporting foot, moved by a quintic during
+1. Footholds and a zero-moment-point (ZMP) reference: at the center of the stance foot, moved by a quintic during
    double support.
 2. The center of mass c of the linear inverted pendulum under that reference, c - (z/g) c'' = p with c = p at both
    ends: a tridiagonal boundary value problem.
-3. Multibody correction: the ZMP of the whole robot by inverse dynamics, its error through the same boundary value
-   problem, the base moved by the result; a few passes.
-4. Analytic inverse kinematics, then a quintic spline through the joint angles, whose own derivatives are the reference
+3. Multibody correction: the ZMP error of the whole robot from inverse dynamics gives, through the same boundary value
+   problem, a correction of the base; a few passes.
+4. Analytic inverse kinematics, then a quintic spline through the joint angles, whose derivatives are the reference
    velocity and acceleration.
 
 Sources: Kajita et al., "Biped walking pattern generation by using preview control of zero-moment point" (ICRA 2003);
@@ -35,9 +35,9 @@ from artde_gym.robots.ojas.leg_ik import leg_angles
 STAND = 2.0  # s, before the first step and after the last one
 DOUBLE_SUPPORT = 0.2  # share of a step
 STEP_HEIGHT = 0.04  # m
-GRID = 0.005  # s, of the pendulum problem and of the spline knots
-PASSES = 5  # of the multibody correction
-LONGEST = 1800.0  # s, of a walk; it takes 1.5 MB a second, and 3 % of its time to plan
+GRID_PERIOD = 0.005  # s, of the pendulum problem and of the spline knots
+CORRECTION_PASSES = 5  # of the multibody correction
+MAX_DURATION = 1800.0  # s, of a walk; it needs 1.5 MB per second, and 3 % of its duration for planning
 
 _HIPS = np.array([[0.0, robot.HIP_OFFSET, 0.0], [0.0, -robot.HIP_OFFSET, 0.0]])
 
@@ -51,7 +51,7 @@ class WalkingPattern:
         base: position of the upright base, (samples, 3) (m).
         feet: ankle positions, left then right, (samples, 2, 3) (m).
         zmp: reference zero moment point, (samples, 2) (m).
-        load_left: share of the weight meant for the left foot, (samples,).
+        load_left: planned share of the weight on the left foot, (samples,).
         phase: progress within a stride of two steps, 0 to 1, (samples,); 0 while standing.
     """
 
@@ -71,9 +71,9 @@ class WalkingPattern:
 
 
 def hip_height_above_ankle(speed: float, step_duration: float = 1.0) -> float:
-    """0.37 m at 0.1 m/s and 0.345 m at 0.2 m/s; long and slow steps, on which the body sways further, need less.
+    """Return 0.37 m at 0.1 m/s and 0.345 m at 0.2 m/s, and less for long, slow steps, in which the body sways more.
 
-    The second bound keeps the knee bent by 15 degrees or more over the whole range of `walking_pattern`.
+    The second bound keeps the knee bent by at least 15 degrees over the whole range of `walking_pattern`.
     """
     return min(0.395 - 0.25 * speed, 0.38 - (0.25 + 0.62 * step_duration) * (speed * step_duration) ** 2)
 
@@ -81,27 +81,27 @@ def hip_height_above_ankle(speed: float, step_duration: float = 1.0) -> float:
 def walking_pattern(
     speed: float = 0.1, step_duration: float = 1.0, duration: float = 58.0, period: float = 0.001
 ) -> WalkingPattern:
-    """The walk of `duration` seconds at `speed` (m/s), one step every `step_duration` seconds.
+    """Return a walk of `duration` (s) at `speed` (m/s) with one step every `step_duration` (s).
 
-    The result is cached and its arrays are read-only, so that every environment of a process shares one.
+    The result is cached and its arrays are read-only, so that all environments of a process share it.
 
     Raises:
-        OptionError: a speed outside 0 to 0.25 m/s, a step outside 0.6 to 2 s, a step longer than 0.25 m, a walk
+        OptionError: for a speed outside 0 to 0.25 m/s, a step outside 0.6 to 2 s, a step longer than 0.25 m, a walk
             outside 0.1 to 1800 s, or a period outside 1e-6 to 0.1 s.
     """
     speed = check_number("speed", speed, 0.0, 0.25, "0 to 0.25 m/s")
     step_duration = check_number("step_duration", step_duration, 0.6, 2.0, "0.6 to 2 s")
     if speed * step_duration > 0.25:
         raise OptionError("speed * step_duration", speed * step_duration, "a step of at most 0.25 m")
-    duration = check_number("duration", duration, 0.1, LONGEST, f"0.1 to {LONGEST:g} s")
+    duration = check_number("duration", duration, 0.1, MAX_DURATION, f"0.1 to {MAX_DURATION:g} s")
     period = check_number("period", period, 1e-6, 0.1, "1e-6 to 0.1 s")
-    return _pattern(speed, step_duration, duration, period)  # by position: the cache tells names from positions
+    return _pattern(speed, step_duration, duration, period)  # positional: the cache distinguishes keyword arguments
 
 
 @functools.lru_cache(maxsize=8)
 def _pattern(speed: float, step_duration: float, duration: float, period: float) -> WalkingPattern:
     gait = _Gait(speed, step_duration, duration)
-    time = GRID * np.arange(math.ceil(duration / GRID - 1e-9) + 1)
+    time = GRID_PERIOD * np.arange(math.ceil(duration / GRID_PERIOD - 1e-9) + 1)
     hips = _solve(gait, time)
     fine = period * np.arange(math.floor(duration / period + 1e-9) + 1)
     spline = _spline(time, _joint_angles(hips, gait.feet(time)))
@@ -124,7 +124,7 @@ def _pattern(speed: float, step_duration: float, duration: float, period: float)
 
 
 class _Gait:
-    """Footholds over time. Step i lasts from start + i T to start + (i + 1) T, double support first."""
+    """Footholds over time; step i lasts from start + i T to start + (i + 1) T, with double support first."""
 
     def __init__(self, speed: float, step_duration: float, duration: float) -> None:
         self.speed = speed
@@ -133,7 +133,7 @@ class _Gait:
         self.length = speed * step_duration
 
     def foothold(self, foot: NDArray[np.int_], steps: NDArray[np.int_]) -> Array:
-        """Ankle x of each `foot` (0 left, 1 right) after a number of steps; the right foot swings first."""
+        """Return the ankle x of each `foot` (0 left, 1 right) after a number of steps; the right foot swings first."""
         steps = np.minimum(steps, self.steps)
         last_swing = np.where((steps - 1) % 2 == (1 - foot), steps - 1, steps - 2)  # index of this foot's last step
         landed = self.length * np.where(last_swing == self.steps - 1, last_swing, last_swing + 1)
@@ -154,7 +154,7 @@ class _Gait:
         return feet
 
     def load_left(self, time: Array) -> Array:
-        """The left foot carries half while standing, all or nothing in single support, a quintic between."""
+        """Return the left foot's share of the load: 0.5 while standing, 0 or 1 in single support, a quintic between."""
         step, u = self._progress(time)
 
         def after(steps: NDArray[np.int_]) -> Array:
@@ -163,7 +163,7 @@ class _Gait:
         return after(step - 1) + (after(step) - after(step - 1)) * _quintic(u / DOUBLE_SUPPORT)
 
     def zmp(self, time: Array) -> Array:
-        """On the line between the foot centers, at the planned share; the feet stand still while it moves."""
+        """Return the ZMP between the foot centers at the planned share; the feet rest while it moves."""
         step, _ = self._progress(time)
         left, right = (self.foothold(np.array(foot), step) for foot in (0, 1))
         load = self.load_left(time)
@@ -177,14 +177,14 @@ class _Gait:
         return np.where(walking, (step % 2 + u) / 2, 0.0)
 
     def _progress(self, time: Array) -> tuple[NDArray[np.int_], Array]:
-        """Index of the step, clipped to one before the first and one after the last, and progress within it."""
+        """Return the step's index, clipped to one before the first and one after the last, and progress within it."""
         exact = (time - STAND) / self.period
         step = np.clip(np.floor(exact + 1e-9), -1, self.steps).astype(int)
         return step, np.clip(exact - step, 0.0, 1.0)
 
 
 def _solve(gait: _Gait, time: Array) -> Array:
-    """Positions of the base (samples, 3) under which the whole robot's ZMP follows the gait's."""
+    """Return positions of the base (samples, 3) for which the whole robot's ZMP follows the gait's."""
     tree = RigidBodyTree(robot.ojas("none"))
     zmp, feet = gait.zmp(time), gait.feet(time)
     hips = np.zeros((len(time), 3))
@@ -193,14 +193,14 @@ def _solve(gait: _Gait, time: Array) -> Array:
     com = tree.center_of_mass(_joint_angles(hips[:1], feet[:1]))[0]
     height = hips[0, 2] + com[2]
     hips[:, :2] = _pendulum(zmp, height) - com[:2]
-    for _ in range(PASSES):
+    for _ in range(CORRECTION_PASSES):
         hips[:, :2] -= _pendulum(_multibody_zmp(tree, time, hips, feet) - zmp, height)
     return hips
 
 
 def _pendulum(zmp: Array, height: float) -> Array:
-    """c of c - (z/g) c'' = p for each column, with c = p at both ends."""
-    count, ratio = len(zmp), height / GRAVITY / GRID**2
+    """Solve c - (z/g) c'' = p for each column, with c = p at both ends."""
+    count, ratio = len(zmp), height / GRAVITY / GRID_PERIOD**2
     bands = np.zeros((3, count))
     bands[0, 2:] = bands[2, :-2] = -ratio
     bands[1] = 1 + 2 * ratio
@@ -209,7 +209,7 @@ def _pendulum(zmp: Array, height: float) -> Array:
 
 
 def _multibody_zmp(tree: RigidBodyTree, time: Array, hips: Array, feet: Array) -> Array:
-    """Point of the ground where the ground reaction has no horizontal moment, (samples, 2) (m)."""
+    """Return the point where the ground reaction has no horizontal moment, (samples, 2) (m)."""
     joints, base = _spline(time, _joint_angles(hips, feet)), _spline(time, hips)
     zero = np.zeros_like(hips)
     motion = (np.concatenate([base.derivative(order)(time), zero], axis=-1) for order in (1, 2))
@@ -227,12 +227,12 @@ def _joint_angles(hips: Array, feet: Array) -> Array:
 
 
 def _spline(time: Array, values: Array) -> BSpline:
-    """Quintic through all values, at rest at both ends."""
+    """Return a quintic spline through all values, at rest at both ends."""
     rest = [(1, np.zeros(values.shape[1])), (2, np.zeros(values.shape[1]))]
     return make_interp_spline(time, values, k=5, bc_type=(rest, rest))
 
 
 def _quintic(u: Array) -> Array:
-    """From 0 at u <= 0 to 1 at u >= 1 with zero first and second derivatives at both ends."""
+    """Return a quintic from 0 at u <= 0 to 1 at u >= 1 with zero first and second derivatives at both ends."""
     u = np.clip(u, 0.0, 1.0)
     return u**3 * (10 - 15 * u + 6 * u**2)

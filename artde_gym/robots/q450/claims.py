@@ -1,4 +1,4 @@
-"""The thesis' claims of the Q450."""
+"""The thesis' claims about the Q450."""
 
 from __future__ import annotations
 
@@ -6,7 +6,12 @@ from artde_gym.robots.q450.thesis import ATTITUDE, POSITION
 from artde_gym.studies.reproduce.claims import Claim, adapts, falls, improves, ordered
 
 CLAIMS: tuple[Claim, ...] = (
-    Claim("Q1", "nobody crashes", "nobody crashes", falls("Q1", {"atde": False, "asmc": False, "artde": False})),
+    Claim(
+        "Q1",
+        "no controller crashes",
+        "no controller crashes",
+        falls("Q1", {"atde": False, "asmc": False, "artde": False}),
+    ),
     *(
         Claim(
             "Q1",
@@ -55,7 +60,7 @@ CLAIMS: tuple[Claim, ...] = (
     *(
         Claim(
             name,
-            f"adaptation adds to {what} in wind (ARTDE against {rival})",
+            f"adaptation improves on {what} in wind (ARTDE against {rival})",
             "ours",
             adapts(name, rival, "rmse_m"),
             ablation=rival == "tde+kd",
@@ -65,7 +70,7 @@ CLAIMS: tuple[Claim, ...] = (
     ),
     Claim(
         "Q1-calm",
-        "ARTDE is better than ATDE, and ATDE than TDE, without wind too",
+        "ARTDE is better than ATDE, and ATDE than TDE, also without wind",
         "ours",
         ordered("Q1-calm", ("artde", "atde", "tde"), "rmse_m"),
     ),

@@ -1,10 +1,11 @@
-"""The infinity-shaped path of the quadrotor: two loops from the place where they cross, each from rest to rest.
+"""Infinity-shaped path of the quadrotor: two loops from the crossing point, each from rest to rest.
 
 x = 1.2 sin th,   y = 0.6 sin 2 th,   z = 0.6 + 0.2 sin th          (m)
 
-The angle th turns once a loop: its rate rises to a constant by a quintic within 4 s, and falls by the same quintic at
-the end, so that position, velocity, acceleration and jerk are continuous. Loop 1 ends at 33 s, loop 2 lasts from 37 s
-to 70 s; in between the path rests. Source: Dantu 2023, section 3.5, which gives shape and times; the sizes are ours.
+The angle th makes one turn per loop: its rate rises to a constant by a quintic within 4 s, and falls by the same
+quintic at the end, so that position, velocity, acceleration and jerk are continuous. Loop 1 ends at 33 s, loop 2 lasts
+from 37 s to 70 s; in between the path rests. Source: Dantu 2023, section 3.5, for shape and times; the sizes are this
+project's.
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ from artde_gym.arrays import Array
 START = (0.0, 0.0, 0.6)  # m
 LOOPS = ((0.0, 33.0), (37.0, 70.0))  # s
 RAMP = 4.0  # s
-LONGEST = 7200.0  # s
+MAX_DURATION = 7200.0  # s
 
 _AMPLITUDE = np.array([1.2, 0.6, 0.2])
-_FREQUENCY = np.array([1.0, 2.0, 1.0])  # waves a turn
+_FREQUENCY = np.array([1.0, 2.0, 1.0])  # waves per turn
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,8 +33,7 @@ class InfinityPath:
     """The path sampled every `period` seconds; row k is time k * period.
 
     Attributes:
-        position, velocity, acceleration, jerk: (samples, 3) (m, m/s, m/s^2, m/s^3), world axes; each the exact
-            derivative of the one before.
+        position, velocity, acceleration, jerk: (samples, 3) (m, m/s, m/s^2, m/s^3), world axes; exact derivatives.
         yaw, yaw_rate: heading, (samples,) (rad, rad/s): zero throughout.
     """
 
@@ -47,16 +47,16 @@ class InfinityPath:
 
 
 def infinity_path(duration: float = 70.0, period: float = 0.015) -> InfinityPath:
-    """The first `duration` seconds of the path; after loop 2 it rests.
+    """Return the first `duration` seconds of the path; after loop 2 it rests.
 
-    The result is cached and its arrays are read-only, so that every environment of a process shares one.
+    The result is cached and its arrays are read-only, so that all environments of a process share it.
 
     Raises:
-        OptionError: a path outside 0.1 to 7200 s, or a period outside 1e-6 to 0.1 s.
+        OptionError: for a path outside 0.1 to 7200 s, or a period outside 1e-6 to 0.1 s.
     """
-    duration = check_number("duration", duration, 0.1, LONGEST, f"0.1 to {LONGEST:g} s")
+    duration = check_number("duration", duration, 0.1, MAX_DURATION, f"0.1 to {MAX_DURATION:g} s")
     period = check_number("period", period, 1e-6, 0.1, "1e-6 to 0.1 s")
-    return _path(duration, period)  # by position: the cache tells names from positions
+    return _path(duration, period)  # positional: the cache distinguishes keyword arguments
 
 
 @functools.lru_cache(maxsize=8)
@@ -81,7 +81,7 @@ def _path(duration: float, period: float) -> InfinityPath:
 
 
 def _angle(time: Array) -> Array:
-    """The angle th and its first three derivatives at each time, (4, samples) (rad, s)."""
+    """Return the angle th and its first three derivatives at each time, (4, samples) (rad, s)."""
     out = np.zeros((4, len(time)))
     for start, end in LOOPS:
         rate = 2 * math.pi / (end - start - RAMP)  # of th while it is constant; each ramp covers half of it
@@ -91,7 +91,7 @@ def _angle(time: Array) -> Array:
 
 
 def _ramp(time: Array) -> Array:
-    """Integral, value and two derivatives of a quintic that rises from 0 to 1 within `RAMP`, (4, samples)."""
+    """Return integral, value and two derivatives of a quintic that rises from 0 to 1 within `RAMP`, (4, samples)."""
     s = np.clip(time / RAMP, 0.0, 1.0)
     beyond = np.maximum(time - RAMP, 0.0)
     return np.array(

@@ -1,7 +1,7 @@
-"""What a plug-in says of the Q450: its environments, scenarios and frontiers, and how it is shown.
+"""Plug-in of the Q450: its environments, scenarios, frontiers and presentation.
 
-Each scenario varies by the air, by a payload within 5 % of its mass and 5 mm of its place (as it is weighed and
-gripped), and by a start within 5 mm of the path (as a vehicle hovers there).
+Each scenario varies the wind, the payload's mass (by 5 %) and position (by 5 mm), as weighing and gripping do, and the
+start (within 5 mm of the path), as hovering does.
 """
 
 from __future__ import annotations

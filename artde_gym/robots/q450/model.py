@@ -1,8 +1,8 @@
 """The quadrotor of the thesis: a Q-450 frame with a computer and a gripper, 1.48 kg.
 
-The thesis gives the frame, 1.4 kg without computer and gripper, and the gripper's 0.03 kg; the rest is ours
+The thesis gives the frame, 1.4 kg without computer and gripper, and the gripper's 0.03 kg; all else is this project's
 (`docs/deviations.md`). Body frame: at the center of mass; x forward, y left, z up along the thrust. Four rotors in X
-configuration, counted counter-clockwise from the front left as seen from above; neighbors turn in opposite directions.
+configuration, counted counterclockwise from the front left as seen from above; neighbors turn in opposite directions.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ ARM = 0.225  # m, rotor axis to center
 ROTOR_RADIUS = 0.127  # m, of a ten inch propeller
 MAX_THRUST = 8.5  # N, of one rotor
 TORQUE_PER_THRUST = 0.016  # m, a rotor's reaction torque over its thrust
-ROTOR_LAG = 0.035  # s, of thrust behind its command
-DRAG = 0.35  # N s/m, of the rotors against the air, in every direction
+ROTOR_LAG = 0.035  # s, time constant of the thrust
+DRAG = 0.35  # N s/m, of the rotors relative to the air, in every direction
 
 ROTORS = ("front_left", "rear_left", "rear_right", "front_right")
 SPIN = (1, -1, 1, -1)  # sign of the reaction torque about z: the front left rotor turns clockwise
-PAYLOAD_PLACE: Vector = (0.01, 0.0, -0.10)  # m, where the gripper holds its load
+PAYLOAD_PLACE: Vector = (0.01, 0.0, -0.10)  # m, position of the load in the gripper
 
 _SIDE = ARM / math.sqrt(2.0)
 _PER_TILT, _PER_TURN = 0.25 / _SIDE, 0.25 / TORQUE_PER_THRUST
@@ -46,19 +46,19 @@ MIXER: Array = np.array(
         [TORQUE_PER_THRUST * sign for sign in SPIN],
     ]
 )
-"""Rotor thrusts (N) to the wrench [u1 (N), u2, u3, u4 (Nm)]: thrust along body z, torques about body x, y, z."""
+"""Matrix from rotor thrusts (N) to the wrench [u1 (N), u2, u3, u4 (Nm)]: thrust along, torques about body axes."""
 ALLOCATION: Array = np.linalg.inv(MIXER)
-"""The wrench to rotor thrusts, before their limits."""
+"""Matrix from the wrench to rotor thrusts, before their limits."""
 MIXER.flags.writeable = ALLOCATION.flags.writeable = False
 
 MAX_WRENCH = (4 * MAX_THRUST, 2 * MAX_THRUST * _SIDE, 2 * MAX_THRUST * _SIDE, 2 * MAX_THRUST * TORQUE_PER_THRUST)
-"""The most that the rotors can give of each, one at a time (N, Nm)."""
+"""Largest value of each component of the wrench on its own (N, Nm)."""
 MIN_WRENCH = (0.0, -MAX_WRENCH[1], -MAX_WRENCH[2], -MAX_WRENCH[3])
-"""The least."""
+"""Smallest value of each component of the wrench on its own (N, Nm)."""
 
 Number = TypeVar("Number", float, Array)
 
-STRIPS = 12  # of a rotor disc in pictures
+DISC_STRIPS = 12  # boxes per rotor disc in images
 
 _DARK = (0.16, 0.17, 0.20, 1.0)
 _RED = (0.75, 0.20, 0.18, 1.0)
@@ -67,7 +67,7 @@ _BLADE = (0.25, 0.27, 0.32, 1.0)
 
 
 def wrench(front_left: Number, rear_left: Number, rear_right: Number, front_right: Number) -> tuple[Number, ...]:
-    """`MIXER` times the rotors' thrusts, elementwise: u1 (N), u2, u3, u4 (Nm)."""
+    """Multiply `MIXER` by the rotors' thrusts, elementwise: u1 (N), u2, u3, u4 (Nm)."""
     left, right = front_left + rear_left, front_right + rear_right
     rear, front = rear_left + rear_right, front_left + front_right
     turning, counter_turning = front_left + rear_right, rear_left + front_right
@@ -80,13 +80,13 @@ def wrench(front_left: Number, rear_left: Number, rear_right: Number, front_righ
 
 
 def thrusts(u1: Number, u2: Number, u3: Number, u4: Number) -> tuple[Number, ...]:
-    """`ALLOCATION` times a wrench, elementwise: thrusts of the rotors (N), not yet limited."""
+    """Multiply `ALLOCATION` by a wrench, elementwise: thrusts of the rotors (N) before their limits."""
     lift, roll, pitch, yaw = 0.25 * u1, _PER_TILT * u2, _PER_TILT * u3, _PER_TURN * u4
     return lift + roll - pitch + yaw, lift + roll + pitch - yaw, lift - roll + pitch + yaw, lift - roll - pitch - yaw
 
 
 def rotor_heights(height: Number, ahead: Number, aside: Number) -> tuple[Number, Number, Number, Number]:
-    """World z of the rotors, elementwise, from that of the center and those of the body's x and y axes."""
+    """Return world z of the rotors, elementwise, from that of the center and of the body's x and y axes."""
     x, y = _SIDE * ahead, _SIDE * aside
     both, apart = x + y, x - y
     return height + both, height - apart, height - both, height + apart
@@ -94,7 +94,7 @@ def rotor_heights(height: Number, ahead: Number, aside: Number) -> tuple[Number,
 
 @functools.cache
 def q450() -> RobotSpec:
-    """The quadrotor as one rigid body that can be pushed at its center, `body`, and at each rotor."""
+    """Return the quadrotor as one rigid body with sites at its center, `body`, and at each rotor."""
     body = Link("body", MASS, com=(0.0, 0.0, 0.0), inertia=INERTIA, visuals=_visuals())
     sites = [("body", "body", (0.0, 0.0, 0.0))]
     sites += [(name, "body", place) for name, place in zip(ROTORS, ROTOR_PLACES, strict=True)]
@@ -102,15 +102,15 @@ def q450() -> RobotSpec:
 
 
 def _visuals() -> tuple[Box, ...]:
-    """Boxes lie along the axes: an arm, at 45 degrees to them, is a row of them; a rotor disc is cut into strips."""
+    """Return axis-aligned boxes: a row of them for each arm, which is at 45 degrees, and strips for each rotor disc."""
     shapes = [Box((0.11, 0.11, 0.05), (0.0, 0.0, 0.0), _WHITE), Box((0.05, 0.04, 0.03), (0.0, 0.0, -0.04), _DARK)]
-    for (x, y, _), color in zip(ROTOR_PLACES, (_RED, _DARK, _DARK, _RED), strict=True):  # red is ahead
+    for (x, y, _), color in zip(ROTOR_PLACES, (_RED, _DARK, _DARK, _RED), strict=True):  # red is the front
         steps = [0.2 + 0.8 * i / 9 for i in range(10)]
         shapes += [Box((0.026, 0.026, 0.018), (share * x, share * y, 0.0), color) for share in steps]
         shapes.append(Box((0.03, 0.03, 0.04), (x, y, 0.01), _DARK))
-        for i in range(STRIPS):
-            aside = ROTOR_RADIUS * ((2 * i + 1) / STRIPS - 1)
-            size = (2 * math.sqrt(ROTOR_RADIUS**2 - aside**2), 2 * ROTOR_RADIUS / STRIPS, 0.004)
+        for i in range(DISC_STRIPS):
+            aside = ROTOR_RADIUS * ((2 * i + 1) / DISC_STRIPS - 1)
+            size = (2 * math.sqrt(ROTOR_RADIUS**2 - aside**2), 2 * ROTOR_RADIUS / DISC_STRIPS, 0.004)
             shapes.append(Box(size, (x, y + aside, 0.035), _BLADE))
     for x in (-0.08, 0.08):  # skids
         for y in (-0.08, 0.08):

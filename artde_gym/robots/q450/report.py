@@ -1,4 +1,4 @@
-"""Figures of the flight: the path in space and in two planes, flown and meant."""
+"""Figures of the flight: flown and reference path in space and in two planes."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from artde_gym.report.run import Episode
 
 PLANES = {"XZ": (0, 2), "YZ": (1, 2), "XY": (0, 1)}
 WIDTH = 400
-AZIMUTH, ELEVATION = math.radians(-60.0), math.radians(28.0)  # of the eye, as seen from the middle
-GRID = 0.5  # m, of the floor
-STRIDE = 4  # of stored samples: a path needs fewer than a signal
+AZIMUTH, ELEVATION = math.radians(-60.0), math.radians(28.0)  # rad, of the camera
+GRID = 0.5  # m, spacing of the floor's grid
+SAMPLE_STRIDE = 4  # stored samples per drawn point: a path needs fewer than a signal
 
 
 _CASCADE: tuple[Block, ...] = (
@@ -43,22 +43,22 @@ _CASCADE_WIRES = (
 
 
 def loop() -> str:
-    """Return the block diagram of a position loop outside and an attitude loop inside."""
+    """Return the block diagram of an outer position loop and an inner attitude loop."""
     name = "Block diagram of the cascade: position loop, desired attitude, attitude loop, allocation, vehicle"
     return diagram(name, 205, _CASCADE, _CASCADE_WIRES)
 
 
 def reference(_kwargs: Mapping[str, Any]) -> dict[str, list[str]]:
-    """Return the loop, the same for all arguments."""
+    """Return the figure of the loop, the same for all arguments."""
     return {"q450": [loop()]}
 
 
 def figures(episode: Episode) -> list[str]:
-    """The infinity path in three dimensions and its projections."""
+    """Return figures of the infinity path in three dimensions and of its projections."""
     shown = styles(episode.signals)
-    paths = {name: signals.fields["position"][::STRIDE] for name, signals in episode.signals.items()}
+    paths = {name: signals.fields["position"][::SAMPLE_STRIDE] for name, signals in episode.signals.items()}
     longest = max(episode.signals.values(), key=lambda signals: len(signals.time))
-    wanted = longest.fields["position_ref"][::STRIDE]
+    wanted = longest.fields["position_ref"][::SAMPLE_STRIDE]
     charts = {"3D": _space(paths, wanted)}
     for plane, (i, j) in PLANES.items():
         everything = np.concatenate([wanted, *paths.values()])
@@ -117,7 +117,7 @@ def _space(paths: dict[str, Array], wanted: Array) -> str:
 
 
 def _seen(points: Array) -> Array:
-    """Parallel projection (n, 2) of points (n, 3)."""
+    """Return the parallel projection (n, 2) of points (n, 3)."""
     x, y, z = points.T
     right = -math.sin(AZIMUTH) * x + math.cos(AZIMUTH) * y
     away = math.cos(AZIMUTH) * x + math.sin(AZIMUTH) * y

@@ -1,4 +1,4 @@
-"""What lies between a commanded wrench and the thrusts of a vehicle's rotors: delay, limits, losses, lag."""
+"""Rotor model: delay, limits, losses and lag between a commanded wrench and the rotors' thrusts."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ class Rotors:
     """The four rotors of one vehicle during one episode.
 
     Args:
-        sampled: drawn disturbances, of which "action_delay", "actuator_effectiveness" and "motor_lag" matter here.
-        thrusts: with which they turn at the start (N), as they did for ever before.
-        time_step: of the physics (s).
-        steps: of the physics in a control period.
+        sampled: sampled disturbances; "action_delay", "actuator_effectiveness" and "motor_lag" are used.
+        thrusts: steady-state thrusts at the start (N).
+        time_step: physics time step (s).
+        steps: physics steps per control period.
 
     Attributes:
-        thrusts: now (4,) (N).
+        thrusts: current thrusts (4,) (N).
     """
 
     def __init__(self, sampled: Mapping[str, Any], thrusts: Sequence[float], time_step: float, steps: int) -> None:
@@ -42,11 +42,11 @@ class Rotors:
         self._late = deque([self.thrusts] * sampled.get("action_delay", {}).get("steps", 0))
 
     def advance(self, wrench: Sequence[float], first: int) -> Array:
-        """Mean thrusts (steps, 4) (N) over each physics step of a control period.
+        """Return the mean thrusts (steps, 4) (N) over each physics step of a control period.
 
         Args:
-            wrench: the command [u1 (N), u2, u3, u4 (Nm)] with which the period begins.
-            first: its first physics step, counted from the start of the episode.
+            wrench: the command [u1 (N), u2, u3, u4 (Nm)] at the start of the period.
+            first: the period's first physics step of the episode.
         """
         aim = np.array([min(max(thrust, 0.0), robot.MAX_THRUST) for thrust in robot.thrusts(*wrench)])
         self._late.append(aim)
@@ -63,7 +63,7 @@ class Rotors:
         return follow(values[:-1], target, 0.0, self._mean)[1]
 
     def _left(self, aim: Array, step: int) -> Array:
-        """What losses leave of an aim."""
+        """Apply losses to target thrusts."""
         aim = aim.copy()
         for start, rotor, factor in self._losses:
             if step >= start:

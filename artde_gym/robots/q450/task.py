@@ -1,4 +1,4 @@
-"""What the single and the batched quadrotor share: layouts, reward, end of an episode, documentation."""
+"""Flight task of the Q450 for single and vector environments: layouts, reward, termination and documentation."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ from artde_gym.multibody.spec import Vector
 from artde_gym.robots.q450 import model as robot
 from artde_gym.robots.q450.infinity import START, infinity_path
 
-STREAMS = 3  # of noise in an episode: wind, motion capture, sensor noise
+STREAMS = 3  # noise streams per episode: wind, motion capture, sensor noise
 DEFAULT_DISTURBANCES: dict[str, Any] = {
     "payload": {"mass": 0.35, "detach_time": 35.0},
     "wind": 1.0,
     "ground_effect": 1.0,
 }
 
-VOLUME = 3.0  # m, of flight: to either side of the start, and above the ground
-TUMBLING = 30.0  # rad/s, rate of turning that is out of bounds too
+FLIGHT_BOUND = 3.0  # m, bound of x and y on either side of the start, and of the height
+MAX_SPIN = 30.0  # rad/s, bound of the body rates' norm
 GROUND_HEIGHT = 0.1  # m, of the vehicle's origin when the skids touch the ground
 MAX_RATE = 1000.0  # rad/s, bound of observed body rates
-MAX_SPEED = 100.0  # m/s, likewise
+MAX_SPEED = 100.0  # m/s, bound of observed velocities
 
 OBSERVATION = Layout(
     (
         Field("position", 3, "m", -10.0, 10.0, "vehicle's center of mass without payload, world axes"),
-        Field("velocity", 3, "m/s", -MAX_SPEED, MAX_SPEED, "of that point, world axes"),
-        Field("rot_body_to_world", 9, "1", -1.01, 1.01, "rotation matrix R, row by row"),
+        Field("velocity", 3, "m/s", -MAX_SPEED, MAX_SPEED, "velocity of that point, world axes"),
+        Field("rot_body_to_world", 9, "1", -1.01, 1.01, "rotation matrix R, body to world, row by row"),
         Field("body_rates", 3, "rad/s", -MAX_RATE, MAX_RATE, "angular velocity, body axes"),
         Field("position_ref", 3, "m", -5.0, 5.0, "reference at this instant"),
         Field("velocity_ref", 3, "m/s", -5.0, 5.0, "reference velocity"),
@@ -52,7 +52,7 @@ OBSERVATION = Layout(
             "N, Nm",
             robot.MIN_WRENCH,
             robot.MAX_WRENCH,
-            "mean [u1, u2, u3, u4] that the rotors really gave over the last control period",
+            "mean [u1, u2, u3, u4] of the rotors over the last control period",
         ),
         Field("rotor_thrust", 4, "N", 0.0, robot.MAX_THRUST, "thrust of each rotor at this instant"),
         Field("phase", 1, "1", 0.0, 1.0, "time over duration"),
@@ -81,7 +81,7 @@ AIR_DENSITY = 1.225  # kg/m^3
 
 
 def _heading_error(fields: Fields) -> Array:
-    """All that the observation tells of (phi, theta, psi): the other two references are the policy's own."""
+    """Return the observable error of (phi, theta, psi): the policy chooses the other two references."""
     rot = fields["rot_body_to_world"]
     error = fields["yaw_ref"][..., 0] - np.arctan2(rot[..., 3], rot[..., 0])
     unknown = np.full_like(error, np.nan)
@@ -89,7 +89,7 @@ def _heading_error(fields: Fields) -> Array:
 
 
 def _induced_power(fields: Fields) -> Array:
-    """Sum of T^1.5 / sqrt(2 rho A), what ideal rotors need to hover (W)."""
+    """Return the sum of T^1.5 / sqrt(2 rho A), the power of ideal hovering rotors (W)."""
     disc, thrust = math.pi * robot.ROTOR_RADIUS**2, np.maximum(fields["rotor_thrust"], 0.0)
     return (thrust * np.sqrt(thrust)).sum(axis=-1) / math.sqrt(2.0 * AIR_DENSITY * disc)
 
@@ -121,22 +121,22 @@ DOCUMENTATION = f"""\
 
 {ACTION.table()}
 
-Held for one control period; clipped to the bounds, which are what the rotors give of each at a time; allocated to the
-four rotors, each of which is limited to 0 to {robot.MAX_THRUST:g} N and follows its command as a first-order lag of
-{robot.ROTOR_LAG:g} s. Use Gymnasium's `RescaleAction` for [-1, 1].
+Held for one control period; clipped to the bounds, which the rotors can reach for one component at a time; allocated to
+the four rotors, each of which is limited to 0 to {robot.MAX_THRUST:g} N and follows its command with a first-order lag
+of {robot.ROTOR_LAG:g} s. Use Gymnasium's `RescaleAction` for [-1, 1].
 
 ## Observation
 {OBSERVATION.table()}
 
-`wrench_applied` is what really acted, after limits, lag and losses of rotors, but without the gain of thrust near the
-ground: the time-delay estimate needs just that. What policies do not see: payload, wind, pushes, ground effect.
+`wrench_applied` is the wrench that acted, after limits, lag and losses of rotors, but without ground effect, as needed
+by the time-delay estimate. Policies do not observe payload, wind, pushes and ground effect.
 
 ## Reference
 The infinity-shaped path of `artde_gym.robots.q450.infinity`: loop 1 until 33 s, rest until 37 s, loop 2 until 70 s;
 yaw 0.
 
 ## Reward
-Over a control period L, L times the sum of scale x term; each term is in `info`, as `reward_alive` and so on:
+For a control period L, L times the sum of scale x term; `info` has each term (`reward_alive`, ...):
 
 | term | scale | value |
 |---|---|---|
@@ -150,27 +150,27 @@ Over a control period L, L times the sum of scale x term; each term is in `info`
 A flight of 70 s without an error earns a little under 280.
 
 ## Start
-At rest and level at the path's start, in balance with the payload and on thrusts that have settled.
+At rest and level at the path's start, in equilibrium with the payload and with steady-state thrusts.
 
 ## End
-*Terminated* by a crash, with the reason in `info`: `fell_ground` (the vehicle's origin lower
-than {GROUND_HEIGHT:g} m), `fell_inverted` (tilt above 90 degrees) or `fell_bounds` (x or y beyond {VOLUME:g} m, z above
-{VOLUME:g} m, or turning faster than {TUMBLING:g} rad/s). *Truncated* after `duration`.
+*Terminated* by a crash, with the reason in `info`: `fell_ground` (the vehicle's origin below {GROUND_HEIGHT:g} m),
+`fell_inverted` (tilt above 90 degrees) or `fell_bounds` (x or y beyond {FLIGHT_BOUND:g} m, z above {FLIGHT_BOUND:g} m,
+or body rates with a norm above {MAX_SPIN:g} rad/s). *Truncated* after `duration`.
 
 ## Physics
 Vehicle of {robot.MASS:g} kg with linear drag of {robot.DRAG:g} N s/m against the air; see `artde_gym.robots.q450`. Wind
-and ground effect are those of `artde_gym.disturbances`; the air's force is found every {GRID:g} s and acts unchanged
-along the body's axes until the next time.
+and ground effect are those of `artde_gym.disturbances`; the aerodynamic force is computed every {GRID:g} s and constant
+in body axes in between.
 
 ## Arguments
 | name | default | allowed | meaning |
 |---|---|---|---|
-| `disturbances` | payload of 0.35 kg until 35 s, wind, ground effect | see `artde_gym.disturbances` | what happens \
-besides; `{{}}` for nothing |
-| `control_period` | 0.015 | whole multiples of {GRID:g} s up to 0.05 | time between two actions, L |
-| `measurement` | "ideal" | "ideal", "mocap" | the state itself, or what `artde_gym.disturbances.mocap` sees of it |
-| `duration` | 70.0 | 0.1 to 7200 s | length of the flight |"""
-"""What the pages of both environments share; their own arguments follow."""
+| `disturbances` | payload of 0.35 kg until 35 s, wind, ground effect | see `artde_gym.disturbances` | disturbances; \
+`{{}}` for none |
+| `control_period` | 0.015 | whole multiples of {GRID:g} s up to 0.05 | control period L |
+| `measurement` | "ideal" | "ideal", "mocap" | the true state, or its estimate by `artde_gym.disturbances.mocap` |
+| `duration` | 70.0 | 0.1 to 7200 s | duration of the flight |"""
+"""Text of the pages of both environments; further arguments follow."""
 
 REWARD_SCALES: dict[str, float] = {
     "alive": 1.0,
@@ -191,13 +191,13 @@ Vector3 = tuple[Number, Number, Number]
 def reward_terms(
     error: Number, velocity_error: Number, up: Number, thrust: Number, change: Number, exp: Callable[[Number], Number]
 ) -> dict[str, Number]:
-    """The reward's terms in the order of `REWARD_SCALES`, elementwise.
+    """Return the reward's terms in the order of `REWARD_SCALES`, elementwise.
 
     Args:
         error, velocity_error: squared norms of the tracking errors (m^2, m^2/s^2).
         up: world z component of the body's z axis.
-        thrust, change: squared norms of the rotors' thrusts now and of what they changed in a control period (N^2).
-        exp: the exponential function for this kind of number.
+        thrust, change: squared norms of the rotors' thrusts and of their change in a control period (N^2).
+        exp: the exponential function for this type of number.
     """
     return {
         "alive": 0.0 * error + 1.0,
@@ -210,22 +210,22 @@ def reward_terms(
 
 
 def falls(position: Vector3[Number], up: Number, spin: Number) -> tuple[Any, Any, Any]:
-    """Whether each of `FALL_REASONS` holds, elementwise; a state that is no number any more is out of bounds.
+    """Return which of `FALL_REASONS` hold, elementwise; a state with NaN is out of bounds.
 
     `up` is as in `reward_terms`, `spin` the squared norm of the body rates (rad^2/s^2).
     """
     x, y, z = position
-    inside = (abs(x) <= VOLUME) & (abs(y) <= VOLUME) & (z <= VOLUME) & (spin <= TUMBLING**2)
+    inside = (abs(x) <= FLIGHT_BOUND) & (abs(y) <= FLIGHT_BOUND) & (z <= FLIGHT_BOUND) & (spin <= MAX_SPIN**2)
     return z < GROUND_HEIGHT, up < 0.0, inside ^ True
 
 
 def parse(disturbances: Mapping[str, Any]) -> Disturbances:
-    """Read disturbances of the Q450."""
+    """Parse disturbances of the Q450."""
     return Disturbances.parse(disturbances, WORDS["site"], WORDS["joint"], robot.q450().name)
 
 
 def plan(duration: float, period: float) -> Array:
-    """What the observation takes from the path, one row a control period: (samples, 15)."""
+    """Return the references in the observation, one row per control period: (samples, 15)."""
     path = infinity_path(duration, period)
     phase = path.period * np.arange(len(path.yaw)) / duration
     columns = (path.yaw, path.yaw_rate, phase)
@@ -233,13 +233,13 @@ def plan(duration: float, period: float) -> Array:
 
 
 def start(sampled: Mapping[str, Any]) -> Vector:
-    """Where the vehicle is at the start (m)."""
+    """Return the vehicle's position at the start (m)."""
     x, y, z = map(operator.add, START, sampled.get("initial_position", {}).get("offset", (0.0, 0.0, 0.0)))
     return x, y, z
 
 
 def hover_thrusts(sampled: Mapping[str, Any]) -> list[float]:
-    """Rotor thrusts (N) that balance the level vehicle at the start, with whatever it carries, as far as they can."""
+    """Return rotor thrusts (N) that balance the level vehicle and its payload at the start, within their limits."""
     mass = robot.MASS * sampled.get("mass_scale", {}).get("factor", 1.0)
     payload = sampled.get("payload")
     moment_x = moment_y = 0.0

@@ -1,4 +1,4 @@
-"""What Dantu 2023 reports of the Q450, number by number, to be printed beside ours.
+"""Results of the Q450 published by Dantu 2023, for comparison.
 
 The tables' "MAE" is the maximum absolute error.
 """
@@ -40,4 +40,4 @@ _Q1 = {
     },
 }
 REPORTED = {"Q1": Reported("Table 3.1", _Q1)}
-"""By scenario."""
+"""Published results by scenario."""
