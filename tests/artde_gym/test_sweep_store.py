@@ -314,7 +314,7 @@ def test_of_sweeps_that_begin_together_one_runs_and_the_others_say_so(tmp_path):
     assert outcome.returncode == 0, outcome.stderr
     lines = outcome.stdout.splitlines()
     assert len(lines) == 20
-    assert all("a folder that nobody else writes; process" in line for line in lines)
+    assert all("a folder without another writer; in use by process" in line for line in lines)
 
 
 def test_every_run_leaves_its_provenance(tmp_path, whole):
