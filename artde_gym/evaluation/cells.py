@@ -70,7 +70,7 @@ def _scenarios(env_id: str | None, names: str | Sequence[str]) -> list[Scenario]
     if not entries:
         raise OptionError("scenario", names, "at least one name, or None")
     if again := canonical.twice(entry.name for entry in entries):
-        raise OptionError("scenario", again, "names without duplicates")
+        raise OptionError("scenario", again, "each name once")
     for entry in entries:
         if env_id not in (None, entry.env_id):
             raise OptionError(f"environment of scenario {entry.name!r}", env_id, repr(entry.env_id))

@@ -10,7 +10,7 @@ from artde_gym.evaluation import canonical
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.registration import ControllerSpec, registered_controllers
 
-_LIST = "a list of at least one name or policy"
+_LIST = "a list of names or policies, at least one"
 
 
 def labeled(controllers: Any) -> dict[str, str | Policy]:

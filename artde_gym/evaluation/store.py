@@ -1,9 +1,9 @@
 """Crash-safe results folder: finished episodes one by one, then the summary.
 
-        episodes.csv     one row per episode and controller, appended as each one finishes
+    episodes.csv     one row per episode and controller, appended as each one finishes
     summary.csv      mean and 95 % interval of every metric
     summary.json     configuration and provenance, written before the first episode
-        traces/          <scenario>/<controller>-<episode>.npz, signals at the traces' rate
+    traces/          <scenario>/<controller>-<episode>.npz, signals at the traces' rate
 
 A folder belongs to one configuration and one software: only the same ones can resume it.
 """

@@ -74,5 +74,5 @@ def answering(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
 
 @pytest.mark.parametrize("answer", [b"", b"HTTP/1.1 400 Bad Request\r\n\r\n", b"SSH-2.0-OpenSSH\r\n", HTTP_2])
 def test_somebody_else_at_the_address_is_no_cluster(answer: bytes, answering: Any, tmp_path: Path) -> None:
-    with pytest.raises(OptionError, match="running Ray cluster, which answers within 20 s"):
+    with pytest.raises(OptionError, match="Ray cluster that answers within 20 s"):
         sweep(SMALL, tmp_path / "run", executor="ray", address=answering(answer))

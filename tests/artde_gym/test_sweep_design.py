@@ -146,7 +146,7 @@ def test_whatever_decides_about_an_episode_decides_about_its_cell(name, value):
         ({"sample": {"draws": 3}}, OptionError, ["sample", "vary"]),
         ({"sample": {"draws": 0, "vary": {}}}, OptionError, ["sample: draws", "0"]),
         ({"sample": {"draws": 1, "vary": {"seed": 3}}}, OptionError, ["sample: seed", "uniform"]),
-        ({"sample": {"draws": 1, "vary": {"seed": {"uniform": [2, 1]}}}}, OptionError, ["lower one first"]),
+        ({"sample": {"draws": 1, "vary": {"seed": {"uniform": [2, 1]}}}}, OptionError, ["the lower first"]),
         ({"sample": {"draws": 1, "vary": {"seed": {"log_uniform": [0, 1]}}}}, OptionError, ["above zero"]),
         ({"sample": {"draws": 1, "vary": {"seed": {"integers": [0, 1.5]}}}}, OptionError, ["whole"]),
         ({"sample": {"draws": 1, "vary": {"seed": {"choice": []}}}}, OptionError, ["at least one"]),

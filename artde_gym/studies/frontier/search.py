@@ -1,21 +1,21 @@
-"""The robustness frontier: how much of one disturbance each controller survives.
+"""The robustness frontier: the largest disturbance that each controller survives.
 
-The standard test, the same for all controllers and used where no disturbances are given, is a walk of Ojas of 12 s in
-scenario S2, or a flight of the Q450 of 20 s in scenario Q1 (its payload is not dropped before the end), with what is
-varied set to its value. Where a push is varied, there is one push for 0.2 s on the chest, or the vehicle, in place of
-the scenario's own, from any side with equal probability, at a time drawn uniformly from one stride of steady walking (5
-to 7 s) or half a loop at full speed (6 to 16 s): a robot is easier to topple in some phases than in others, and nobody
-chooses when he is pushed. Where a rotor's loss is varied, it is the front left one's, from such a time on.
+The standard test, the same for all controllers and the default for disturbances, is a walk of Ojas of 12 s in scenario
+S2, or a flight of the Q450 of 20 s in scenario Q1 (its payload is not dropped before the end), with the varied number
+set to its value. If a push is varied, one push for 0.2 s on the chest, or the vehicle, replaces the scenario's own. It
+comes from any side with equal probability, at a time drawn uniformly from one stride of steady walking (5 to 7 s) or
+half a loop at full speed (6 to 16 s), since a robot is easier to topple in some phases than in others. If a rotor's
+loss is varied, it is the front left rotor's, from such a time on.
 
 A level counts as survived if the *observed* share of episodes without a fall is at least `survival`. The bracket holds
-the point where the observed share crosses it, for these seeds. What n episodes say about the true share is Wilson's
-95 % interval at both ends of the bracket: with 18 of 20 survived it is 70 to 97 %. Seeds are the same at every level
-and for every controller, so that two frontiers differ by the controllers and not by luck of the draw; they are one
-sample of the variation nonetheless. Levels off a controller's path through the bisection are not run: survival that
-falls and rises again between them stays unseen.
+the point where the observed share crosses it, for these seeds. The true share is bounded by Wilson's 95 % interval at
+both ends of the bracket: with 18 of 20 survived it is 70 to 97 %. Seeds are the same at every level and for every
+controller, so that two frontiers differ by the controllers and not by chance; they are still one sample of the
+variation. Levels off a controller's path through the bisection are not run: survival that falls and rises again
+between them stays unseen.
 
-    frontier.csv     one row a controller
-    levels.csv       one row a tested level and controller
+    frontier.csv     one row per controller
+    levels.csv       one row per tested level and controller
     frontier.png     survival against the varied value
     frontier.json    configuration and provenance, written before the first episode
     levels/<value>/  the results folder of each level, see `artde_gym.evaluation.store`
@@ -45,7 +45,7 @@ from artde_gym.studies.frontier.result import Frontier
 from artde_gym.studies.frontier.store import FrontierStore
 from artde_gym.studies.frontier.table import LEVEL_COLUMNS, frontier_of
 
-RECORD_HZ = 10.0  # a frontier has hundreds of episodes; their traces are for a look at a fall, not for metrics
+RECORD_HZ = 10.0  # a frontier has hundreds of episodes; their traces are for viewing a fall, not for metrics
 
 
 @takes_old_names
@@ -77,27 +77,27 @@ def frontier(
         controllers: as for `evaluate`.
         env_id: any registered environment of this project.
         vary: "kind.parameter" of `artde_gym.disturbances.DISTURBANCES`, in all entries of a kind that takes several;
-            or an argument of the environment that is a number.
-        low: smallest value, in the parameter's unit (a control period in s); there are defaults for usual paths.
+            or a numeric argument of the environment.
+        low: smallest value, in the parameter's unit (a control period in s); usual paths have defaults.
         high: largest value.
-        tolerance: width of the bracket to be found.
-        harder: whether "larger" or "smaller" values are harder; there are defaults for usual paths.
-        survival: share of episodes without a fall that a level takes to count as survived, above 0 up to 1.
-        episodes: of each controller at each level.
-        seed: of everything; episode i has the same seed at every level and for every controller.
-        workers: processes; the results do not depend on it.
-        out: folder to store everything in; the same call continues an interrupted one.
-        disturbances: in place of the standard test's; the environment's own duration is then kept, too.
-        env_kwargs: arguments of the environment.
+        tolerance: width of the bracket to find.
+        harder: whether "larger" or "smaller" values are harder; usual paths have defaults.
+        survival: share of episodes without a fall at which a level counts as survived, above 0 up to 1.
+        episodes: number per controller and level.
+        seed: base seed; episode i has the same seed at every level and for every controller.
+        workers: number of processes; the results do not depend on it.
+        out: results folder; repeat the call to resume.
+        disturbances: override the standard test's; the environment's own duration is then kept, too.
+        env_kwargs: environment arguments.
         gains: as for `evaluate`, also `vectorized` and `allow_mixed`.
         on_progress: called with the value of the running level and the progress of its episodes.
 
     Returns:
-        The frontier; `complete` is False after an interruption (Ctrl-C), with all finished levels in it.
+        The frontier; after an interruption (Ctrl-C), `complete` is False and all finished levels are in it.
 
     Raises:
-        UnknownNameError, OptionError, DisturbanceError, GainError: for a bad argument, before the first episode.
-        StoreError: if `out` holds other results, or results of other software, or is written by another process.
+        UnknownNameError, OptionError, DisturbanceError, GainError: for an invalid argument, before the first episode.
+        StoreError: if `out` holds other results or results of other software, or another process is writing to it.
     """
     plan = Plan.of(
         controllers,
@@ -121,7 +121,7 @@ def _configuration(plan: Plan, design: Design) -> dict[str, Any]:
     return {
         "env": plan.cells[0].env_id,
         "axis": dataclasses.asdict(design.axis),
-        "controllers": list(plan.controllers),  # what they stand for is checked by the folders of the levels
+        "controllers": list(plan.controllers),  # their content is checked by the levels' folders
         "survival": design.survival,
         "episodes": plan.episodes,
         "seed": plan.seed,
@@ -133,7 +133,7 @@ def _configuration(plan: Plan, design: Design) -> dict[str, Any]:
 
 
 class _Levels:
-    """The levels of a frontier, run where the bisection asks for them."""
+    """The levels of a frontier, run on request of the bisection."""
 
     def __init__(
         self,
@@ -146,7 +146,7 @@ class _Levels:
         self._rows: list[dict[str, Any]] = []
 
     def search(self) -> Frontier:
-        """Run the levels until all brackets are found, or the user interrupts."""
+        """Run levels until all brackets are found or the user interrupts."""
         complete = True
         try:
             search(len(self._design.axis.levels), list(self._plan.controllers), self._run)
@@ -164,7 +164,7 @@ class _Levels:
         return found
 
     def _run(self, index: int, names: list[str]) -> dict[str, bool]:
-        """Run a level with some of the controllers, and say which of them survived it."""
+        """Run a level with some of the controllers; return which of them survived."""
         value = self._design.axis.levels[index]
         plan = self._plan.only(names, self._design.at(value, self._plan.cells[0]))
         folder = None if self._store is None else self._store.level(value)

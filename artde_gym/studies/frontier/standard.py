@@ -1,4 +1,4 @@
-"""The standard test of a frontier: each robot's own, see `artde_gym.kit.FrontierTest`."""
+"""The standard test of a frontier, defined by each robot; see `artde_gym.kit.FrontierTest`."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from artde_gym.scenarios import SCENARIOS
 
 
 def standard_for(env_id: str) -> FrontierTest | None:
-    """Return the standard test of an environment's robot, if it has one."""
+    """Return the standard test of an environment's robot, or None."""
     return ROBOTS[robot_of(env_id)].frontier
 
 
 def standard_test(env_id: str, path: str, arguments: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Disturbances and arguments of the standard test in which `path` is varied; see `frontier`.
+    """Return disturbances and arguments of the standard test in which `path` is varied; see `frontier`.
 
     Raises:
         OptionError: if the environment's robot has no standard test, or the episode ends before the push.

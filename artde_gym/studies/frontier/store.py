@@ -34,12 +34,12 @@ class FrontierStore:
         self._write_record(found)
 
     def draw(self, found: Frontier) -> None:
-        from artde_gym.studies.frontier.figure import draw  # Matplotlib takes long: not at each start of a worker
+        from artde_gym.studies.frontier.figure import draw  # Matplotlib loads slowly: not at each start of a worker
 
         write_atomically(self.path / "frontier.png", lambda file: draw(found, file))
 
     def abandon(self) -> None:
-        """Give a folder back in which nothing was run, after an argument that `evaluate` refused."""
+        """Remove a folder in which nothing was run, after `evaluate` rejected an argument."""
         if not (self.path / "levels").exists():
             (self.path / RECORD).unlink(missing_ok=True)
 

@@ -1,11 +1,11 @@
 """The thesis' scenarios, run and judged claim by claim.
 
-Beside the thesis' controllers and their rivals, an ablation can be run: plain TDE at constant extra stiffness and
-damping (`tde+kd`), as much of it as ARTDE's robust gain c came to *in the same scenario*, on average over its episodes.
-What ARTDE is better than that, it owes to adaptation.
+In addition to the thesis' controllers and their rivals, an ablation can be run: plain TDE with constant extra stiffness
+and damping (`tde+kd`), equal to ARTDE's robust gain c *in the same scenario*, averaged over its episodes. ARTDE's
+advantage over the ablation is due to adaptation.
 
     <out>/                       the folder of `evaluate`, all controllers but the ablation
-    <out>/ablation/<scenario>/   one of the ablation in each scenario, at a gain of its own
+    <out>/ablation/<scenario>/   one folder for the ablation in each scenario, with gains of its own
     <out>/claims.csv             the claims with their verdicts
 """
 
@@ -33,7 +33,7 @@ from artde_gym.scenarios import scenario as find_scenario
 from artde_gym.studies.reproduce.claims import all_claims, judge
 
 ADAPTIVE, ABLATION = "artde", "tde+kd"
-RECORD_EPISODES = 3  # episodes of each cell that leave their signals: to look at; compressing all takes a minute or two
+RECORD_EPISODES = 3  # episodes of each cell with stored signals, for viewing; compressing all takes a minute or two
 GAIN = "robust_gain_mean"  # column of a law's mean c; with a suffix for each loop of a cascade, as its gains have
 
 
@@ -46,15 +46,15 @@ class Reproduction:
 
 
 def titles() -> list[str]:
-    """Return how users call the robots that have scenarios to reproduce."""
+    """Return the titles of the robots that have scenarios to reproduce."""
     return [kit.title for kit in ROBOTS.values() if kit.reproduced[0]]
 
 
 def kit_of(title: str) -> RobotKit:
-    """Return the robot that users call so.
+    """Return the robot with this title.
 
     Raises:
-        UnknownNameError: if there is none with scenarios to reproduce.
+        UnknownNameError: if no robot with scenarios to reproduce has it.
     """
     if title not in titles():
         raise UnknownNameError("robot", title, suggest_names(title, titles()))
@@ -62,7 +62,7 @@ def kit_of(title: str) -> RobotKit:
 
 
 def scenarios_of(robot: str, names: Sequence[str] | None = None) -> tuple[str, ...]:
-    """Return those of the named scenarios in which a robot moves; all that it is reproduced in for None.
+    """Return the named scenarios of a robot; all that reproduce it for None.
 
     Raises:
         UnknownNameError: for an unknown robot or scenario.
@@ -91,29 +91,29 @@ def reproduce(
 
     Args:
         robot: a robot's title, such as "biped" or "quadrotor".
-        out: folder to store everything in; the same call continues an interrupted one.
-        scenarios: of this robot, in place of all that its kit names.
-        controllers: likewise, without the ablation.
-        ablation: whether to run it too; "artde" must be among the controllers then.
-        episodes: seeded episodes of each controller in each scenario.
-        seed: of everything.
-        workers: processes; the results do not depend on it.
+        out: results folder; repeat the call to resume.
+        scenarios: scenarios of this robot; None for all that its kit names.
+        controllers: controllers other than the ablation; None for all that its kit names.
+        ablation: whether to run it too; "artde" must then be among the controllers.
+        episodes: number of seeded episodes per controller and scenario.
+        seed: base seed.
+        workers: number of processes; the results do not depend on it.
         engine: physics engine; None for the default one.
         allow_mixed: as for `evaluate`.
-        on_progress: called with what runs ("episodes", "ablation in S1") and the progress of its episodes.
+        on_progress: called with the running part ("episodes", "ablation in S1") and the progress of its episodes.
 
     Raises:
-        UnknownNameError, OptionError: for a bad argument, before the first episode.
-        StoreError: if `out` holds other results, or results of other software, or is written by another process.
+        UnknownNameError, OptionError: for an invalid argument, before the first episode.
+        StoreError: if `out` holds other results or results of other software, or another process is writing to it.
     """
     chosen = scenarios_of(robot, scenarios)
     if not chosen:
         raise OptionError("scenarios", scenarios, f"at least one of the {robot}'s")
     names = list(kit_of(robot).reproduced[1] if controllers is None else controllers)
     if ABLATION in names:
-        raise OptionError("controllers", ABLATION, "other names; it is run by ablation=True, at gains of its own")
+        raise OptionError("controllers", ABLATION, "other names; pass ablation=True to run it")
     if ablation and ADAPTIVE not in names:
-        raise OptionError("controllers", names, f"{ADAPTIVE!r} among them, from which the ablation takes its gain")
+        raise OptionError("controllers", names, f"names with {ADAPTIVE!r}, whose gain the ablation takes")
     plan = Plan.of(
         names,
         scenario=chosen,
@@ -148,7 +148,7 @@ def _with_ablation(
 
 
 def equivalent_gains(result: Result, scenario: str) -> dict[str, float]:
-    """The ablation's gains c (of a cascade c_p, c_q): means of ARTDE's over its episodes in a scenario."""
+    """Return the ablation's gains c (c_p, c_q for a cascade): means of ARTDE's over its episodes in a scenario."""
     rows = result.rows(scenario, ADAPTIVE)
     means = {column.removeprefix(GAIN): rows[column].to_numpy(np.float64) for column in rows if column.startswith(GAIN)}
     return {f"c{suffix}": float(values.mean()) for suffix, values in means.items() if np.isfinite(values).all()}
