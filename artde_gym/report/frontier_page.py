@@ -1,4 +1,4 @@
-"""The part of a report that shows a frontier."""
+"""Report of a frontier."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ Rows = list[dict[Any, Any]]
 
 
 def read_frontier(folder: Path) -> tuple[Frontier, dict[str, Any]]:
-    """A frontier's folder, finished or not, and its record.
+    """Read a frontier's folder, finished or not, and its record.
 
     Raises:
-        StoreError: if it cannot be read.
+        StoreError: if it is not readable.
     """
     try:
         record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
@@ -34,12 +34,12 @@ def read_frontier(folder: Path) -> tuple[Frontier, dict[str, Any]]:
         table, levels = (parse_table(text, ("controller", "relation")) for text in texts)
         varied, survival = Varied(**wanted["axis"]), wanted["survival"]
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise StoreError("frontier", str(folder), "a folder in which at least one level was finished") from error
+        raise StoreError("frontier", str(folder), "a folder with at least one finished level") from error
     return Frontier(table, levels, varied, survival, folder, bool(record.get("complete"))), record
 
 
 def answer(found: Frontier) -> tuple[str, list[str]]:
-    """A headline, and a sentence on each controller."""
+    """Return a headline, and a sentence on each controller."""
     axis, rows = found.axis, _records(found.table)
     known = [row for row in rows if math.isfinite(row["frontier"]) and row["relation"] in ("=", ">=", "<=")]
     lines = [_sentence(row, found) for row in rows]
@@ -55,11 +55,11 @@ def answer(found: Frontier) -> tuple[str, list[str]]:
 
 
 def parts(found: Frontier) -> list[str]:
-    """Chart and tables."""
+    """Return chart and tables."""
     axis = found.axis
     shown = styles(str(row["controller"]) for row in _records(found.table))
     x = Axis.of(f"{axis.path} ({axis.unit})" if axis.unit != "1" else axis.path, [axis.low, axis.high])
-    chart = Chart("Share of episodes without a fall against what was varied", x, Axis("no fall (%)", 0, 104), 460, 280)
+    chart = Chart("Share of episodes without a fall against the varied value", x, Axis("no fall (%)", 0, 104), 460, 280)
     chart.level(100 * found.survival, f"wanted: {100 * found.survival:g} %")
     for i, (name, look) in enumerate(shown.items()):
         rows = [row for row in _records(found.levels) if row["controller"] == name]

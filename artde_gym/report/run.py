@@ -1,4 +1,4 @@
-"""A results folder as a report reads it, finished or not."""
+"""A results folder, finished or not, as a report reads it."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ class Run:
     """An evaluation on disk.
 
     Attributes:
-        result: its finished episodes, those of an ablation among them.
-        record: what `summary.json` holds: configuration and provenance.
+        result: its finished episodes, including those of an ablation.
+        record: content of `summary.json`: configuration and provenance.
         claims: the thesis' claims with their verdicts, if they were judged.
-        ablation: scenario -> the run of `reproduce`'s ablation in it, in a folder of its own.
+        ablation: scenario -> the run of `reproduce`'s ablation in it, from a folder of its own.
     """
 
     folder: Path
@@ -50,7 +50,7 @@ class Run:
         """Read an evaluation's folder; a row that is being written is left out.
 
         Raises:
-            StoreError: if it is none.
+            StoreError: if it is not one.
         """
         with wrap_read_errors("results folder", folder, "one that `evaluate` or `frontier` wrote", StoreError):
             record = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
@@ -70,12 +70,12 @@ class Run:
         return cls(folder, Result(episodes, folder, complete), record, judged, ablation)
 
     def gains(self, scenario: str) -> dict[str, Mapping[str, Any]]:
-        """Controller -> gains in place of its preset's."""
+        """Return controller -> gains that override its preset's."""
         own = dict(self.record["configuration"].get("gains", {}))
         return own | (self.ablation[scenario].gains(scenario) if scenario in self.ablation else {})
 
     def cell(self, scenario: str) -> Mapping[str, Any]:
-        """Environment and arguments of a scenario."""
+        """Return environment and arguments of a scenario."""
         return next(cell for cell in self.record["configuration"]["cells"] if cell["name"] == scenario)
 
     @property
@@ -87,7 +87,7 @@ class Run:
         return metrics_spec_of(self.cell(scenario)["env_id"])
 
     def episode(self, scenario: str) -> Episode | None:
-        """The first episode whose signals are stored, of all controllers that have it."""
+        """Return the first episode with stored signals, of all controllers that have it."""
         numbers = sorted({int(i) for name in self.result.controllers for i in self.result.rows(scenario, name).index})
         for number in numbers:
             found = {
@@ -108,17 +108,17 @@ class Run:
         if not path.exists() or number not in rows.index:
             return None
         with wrap_read_errors("signals", path, "a file that `evaluate` wrote", StoreError):
-            stored = np.load(io.BytesIO(path.read_bytes()), allow_pickle=False)  # a damaged file it would leave open
+            stored = np.load(io.BytesIO(path.read_bytes()), allow_pickle=False)  # np.load leaves damaged files open
             return Signals({name: stored[name] for name in stored.files}, rows.loc[number].to_dict())
 
 
 @dataclasses.dataclass(frozen=True)
 class Signals:
-    """What one controller did in one episode.
+    """Signals of one controller in one episode.
 
     Attributes:
-        fields: observations by name (samples, size), the policy's inside under "policy.<name>", "time" (samples,).
-        row: of the table of episodes.
+        fields: observations by name (samples, size), the policy's diagnostics under "policy.<name>", "time" (samples,).
+        row: its row in the table of episodes.
     """
 
     fields: Mapping[str, Array]
@@ -133,13 +133,13 @@ class Signals:
         return bool(self.row["fell"])
 
     def inside(self, name: str) -> Array | None:
-        """A diagnostic of the policy (samples, ...), if it has it."""
+        """Return a diagnostic of the policy (samples, ...), if it exists."""
         return self.fields.get(INSIDE + name)
 
 
 @dataclasses.dataclass(frozen=True)
 class Episode:
-    """The same seed under several controllers."""
+    """Episodes of several controllers with the same seed."""
 
     number: int
     signals: Mapping[str, Signals]
@@ -150,12 +150,12 @@ class Episode:
 
     @property
     def end(self) -> float:
-        """The longest of the runs (s)."""
+        """End of the longest run (s)."""
         return max(float(signals.time[-1]) for signals in self.signals.values())
 
     @property
     def disturbances(self) -> dict[str, Any]:
-        """What was drawn, as the grammar writes it."""
+        """Sampled disturbances, in the notation of the grammar."""
         row = next(iter(self.signals.values())).row
         return nested({str(key): value for key, value in row.items() if str(key).startswith("disturbance.")})
 
@@ -165,7 +165,7 @@ class Episode:
 
 
 def nested(columns: Mapping[str, Any]) -> dict[str, Any]:
-    """Columns such as "disturbance.push.0.start" as the nested mappings and lists that they came from."""
+    """Return columns such as "disturbance.push.0.start" as nested mappings and lists."""
     root: dict[str, Any] = {}
     for column, value in columns.items():
         if isinstance(value, float) and np.isnan(value):

@@ -1,4 +1,4 @@
-"""One or several controllers on the same seed in one picture: side by side, each under its name in its color."""
+"""Frames of several controllers on the same seed as tiles of one picture, each under its name in its color."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from artde_gym.video.frames import Frame
 INK = (27, 31, 36)
 SOFT = (91, 100, 112)
 FALLEN = (163, 39, 28)
-HEAD = 15  # a head's height is the width of a panel by this
+HEAD = 15  # ratio of a tile's width to its heading's height
 GAP = 4  # pixels, between tiles
 
 
 def tile_frames(shown: Mapping[str, Frame], title: str, columns: int) -> NDArray[np.uint8]:
-    """Pictures of one instant by controller, under a common title; both sides are even, as video codecs want them.
+    """Combine frames of one instant by controller under a common title; both sides are even, as video codecs require.
 
     Args:
-        shown: controller -> its picture; one that has ended is its last.
-        title: of all.
-        columns: tiles in a row.
+        shown: controller -> its frame; the last one after its episode's end.
+        title: common title.
+        columns: tiles per row.
     """
     height, width, _ = next(iter(shown.values())).picture.shape
     head = max(20, width // HEAD)
@@ -63,7 +63,7 @@ def _text(
     stroke: float = 0.0,
     limit: float = float("inf"),
 ) -> None:
-    """Text of a share of a head's height, shortened at the end to a limit (pixels)."""
+    """Draw text at a share of a heading's height, shortened at the end to a limit (pixels)."""
     font = _font(share * head)
     while draw.textlength(text, font) > limit and len(text) > 4:
         text = text[:-4] + "..."

@@ -17,7 +17,7 @@ from artde_gym.evaluation.workers import AHEAD, PATIENCE, Job, Runs, Work
 ANSWER = 4.0  # s until a cluster has answered
 JOINED = 14.0  # s until a process has joined it
 JOIN = "import ray, sys; ray.init(sys.argv[1], log_to_driver=False, logging_level='ERROR')"
-SETTINGS = b"\x04"  # type of the first frame of a gRPC server, as of any HTTP/2 server
+SETTINGS = b"\x04"  # type of the first frame of any HTTP/2 server, gRPC servers included
 HELLO = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + b"\0\0\0" + SETTINGS + b"\0" * 5
 RETRIES = 3  # of a job whose worker or node is lost
 STORE = 80 * 2**20  # bytes of shared memory for a cluster on this machine: results are a few kB
