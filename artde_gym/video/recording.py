@@ -24,11 +24,11 @@ from artde_gym.video import writer
 from artde_gym.video.frames import Frame, render_frames
 from artde_gym.video.tiles import tile_frames
 
-SPEEDS = (0.001, 1000.0)
+SPEED_RANGE = (0.001, 1000.0)
 """Lowest and highest speed, as shown over simulated time."""
-MOST = 20_000  # frames: eleven minutes at thirty per second
-EARLY = 1e-9  # s by which a sample may precede its time
-HELD = 1.0  # s for which the last frame is shown after all have ended
+MAX_FRAMES = 20_000  # frames: eleven minutes at thirty per second
+TIME_TOLERANCE_S = 1e-9  # by which a sample may precede its time
+END_HOLD_S = 1.0  # for which the last frame is shown after all have ended
 
 
 def video(
@@ -73,7 +73,7 @@ def video(
             render or ffmpeg is missing.
     """
     out = Path(out)
-    speed = check_number("speed", speed, *SPEEDS, "a number from {:g} to {:g}".format(*SPEEDS))
+    speed = check_number("speed", speed, *SPEED_RANGE, "a number from {:g} to {:g}".format(*SPEED_RANGE))
     start = check_number("start", start, 0.0, sys.float_info.max, "a finite number >= 0 (s)")
     end = check_number("end", end, math.nextafter(start, math.inf), math.inf, f"a number > the start, {start:g} (s)")
     columns = None if columns is None else check_integer("columns", columns, 1)
@@ -102,9 +102,9 @@ def video(
     title += f"; seed {seed}, episode {episode}" + ("" if speed == 1 else f"; {speed:g} x speed")
 
     def pictures() -> Iterator[NDArray[np.uint8]]:
-        for shown in _together(videos, held=math.ceil(HELD * fps)):
+        for shown in _together(videos, held=math.ceil(END_HOLD_S * fps)):
             reached = max(frame.time_s for frame in shown.values())
-            if reached < start - EARLY:  # all episodes have ended
+            if reached < start - TIME_TOLERANCE_S:  # all episodes have ended
                 raise OptionError("start", start, f"up to the end of the episode, {reached:g} s")
             if on_progress is not None:
                 on_progress(reached)
@@ -121,9 +121,9 @@ def _check_part(out: Path, cell: Cell, start: float, end: float, step: float) ->
     if start > duration:
         raise OptionError("start", start, f"up to the end of the episode, {duration:g} s")
     count = math.ceil((min(end, duration) - start) / step)
-    if out.suffix != ".png" and count > MOST:
+    if out.suffix != ".png" and count > MAX_FRAMES:
         raise OptionError(
-            "number of pictures", count, f"at most {MOST}: shorten the part, raise the speed or lower the fps"
+            "number of pictures", count, f"at most {MAX_FRAMES}: shorten the part, raise the speed or lower the fps"
         )
 
 

@@ -24,13 +24,13 @@ CODECS: dict[str, list[str]] = {
 SUFFIXES = (*CODECS, ".gif", ".webp", ".png")
 UNITS = {".gif": 100, ".webp": 1000}
 """Suffix -> units per second in which the files count the duration of a frame."""
-FASTEST = {".gif": 50.0, ".webp": 90.0}
+MAX_FPS = {".gif": 50.0, ".webp": 90.0}
 """Suffix -> most frames per second: browsers show frames shorter than 2 and 11 units for a tenth of a second."""
 RATES = (0.01, 1000.0)
 """Lowest and highest frame rate (frames per second)."""
-COLORS = 192  # of a GIF
-SAMPLED = 12  # frames from which a GIF's palette is computed
-QUALITY = 75  # of a WebP
+GIF_COLORS = 192
+GIF_PALETTE_FRAMES = 12  # frames from which a GIF's palette is computed
+WEBP_QUALITY = 75
 
 
 def check(out: Path) -> None:
@@ -53,7 +53,7 @@ def frame_rate(out: Path, fps: float) -> float:
     """
     slowest, fastest = RATES
     given = check_number("fps", fps, slowest, fastest, f"a number from {slowest:g} to {fastest:g}")
-    return round(given, 2) if out.suffix in CODECS else min(given, FASTEST.get(out.suffix, fastest))
+    return round(given, 2) if out.suffix in CODECS else min(given, MAX_FPS.get(out.suffix, fastest))
 
 
 def durations(count: int, fps: float, units: int) -> list[int]:
@@ -103,13 +103,15 @@ def _encode(out: Path, pictures: Iterator[Picture], fps: float) -> None:
 def _gif(out: Path, pictures: Iterator[Picture], fps: float) -> None:
     """Write a GIF with one palette for all frames, rare colors included, so that still parts stay still."""
     frames = [Image.fromarray(picture) for picture in pictures]
-    sample = np.concatenate([np.asarray(frame) for frame in frames[:: -(-len(frames) // SAMPLED)] + frames[-1:]])
-    palette = Image.fromarray(sample).quantize(COLORS, Image.Quantize.MAXCOVERAGE)
+    sample = np.concatenate(
+        [np.asarray(frame) for frame in frames[:: -(-len(frames) // GIF_PALETTE_FRAMES)] + frames[-1:]]
+    )
+    palette = Image.fromarray(sample).quantize(GIF_COLORS, Image.Quantize.MAXCOVERAGE)
     _animate(out, [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames], fps, optimize=True)
 
 
 def _webp(out: Path, pictures: Iterator[Picture], fps: float) -> None:
-    _animate(out, [Image.fromarray(picture) for picture in pictures], fps, quality=QUALITY, method=4)
+    _animate(out, [Image.fromarray(picture) for picture in pictures], fps, quality=WEBP_QUALITY, method=4)
 
 
 def _animate(out: Path, frames: list[Image.Image], fps: float, **options: Any) -> None:

@@ -42,8 +42,8 @@ HTTP_2 = b"\0\0\0\x04" + b"\0" * 5  # empty settings, and nothing after them
 @pytest.fixture
 def answering(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     """A server that answers every client with the same bytes, or takes what it says and is silent."""
-    monkeypatch.setattr(ray_workers, "ANSWER", 0.3)
-    monkeypatch.setattr(ray_workers, "JOINED", 3.0)
+    monkeypatch.setattr(ray_workers, "ANSWER_TIMEOUT_S", 0.3)
+    monkeypatch.setattr(ray_workers, "JOIN_TIMEOUT_S", 3.0)
     servers: list[socket.socket] = []
     clients: list[socket.socket] = []
 

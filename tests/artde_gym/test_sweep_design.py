@@ -198,8 +198,8 @@ def test_a_file_without_an_end_is_not_read_to_it():
     ("text", "words"),
     [
         ("controller: !!python/object/apply:os.system ['touch owned']", "python/object"),
-        ("controller: tde\ncontroller: pid", "'controller' 2 times"),
-        ("grid: {a.b: [1], a.b: [2]}", "'a.b' 2 times"),
+        ("controller: tde\ncontroller: pid", "'controller' is given 2 times"),
+        ("grid: {a.b: [1], a.b: [2]}", "'a.b' is given 2 times"),
         ("a: &x [1]\nb: *x", "alias"),
         ("- tde", "a mapping"),
         ("", "a mapping"),

@@ -14,8 +14,8 @@ from artde_gym.evaluation import statistics
 from artde_gym.evaluation.environments import metrics_spec_of
 from artde_gym.studies.sweep.execution import Sweep
 
-MOST = 50  # rows
-WIDEST = 10_000  # characters, width at which a table is measured
+MAX_ROWS = 50
+MAX_CHARACTERS = 10_000  # width at which a table is measured
 _PREFIXES = ("gains.", "env_kwargs.", "disturbance.")
 
 
@@ -29,14 +29,16 @@ def print_sweep(found: Sweep, console: Console) -> None:
         return
     varied = _varied(episodes)
     cells = [frame for _, frame in episodes.groupby([*varied, "cell"], dropna=False)]
-    table = _table(cells[:MOST], varied)
+    table = _table(cells[:MAX_ROWS], varied)
     console.print(
         table
-        if console.measure(table, options=console.options.update(max_width=WIDEST)).maximum <= console.width
-        else _narrow(cells[:MOST], varied)
+        if console.measure(table, options=console.options.update(max_width=MAX_CHARACTERS)).maximum <= console.width
+        else _narrow(cells[:MAX_ROWS], varied)
     )
-    if len(cells) > MOST:
-        console.print(f"... and {len(cells) - MOST} more cells: artde_gym.evaluation.read_sweep({str(found.folder)!r})")
+    if len(cells) > MAX_ROWS:
+        console.print(
+            f"... and {len(cells) - MAX_ROWS} more cells: artde_gym.evaluation.read_sweep({str(found.folder)!r})"
+        )
     if not found.complete:
         console.print("Interrupted; finished episodes are kept. Re-run the command to resume.")
     console.print(f"Written to {found.folder}")

@@ -14,13 +14,13 @@ from artde_gym.errors import MissingDependencyError, OptionError, WorkerError
 from artde_gym.evaluation.provenance import software
 from artde_gym.evaluation.workers import AHEAD, PATIENCE, Job, Runs, Work
 
-ANSWER = 4.0  # s until a cluster has answered
-JOINED = 14.0  # s until a process has joined it
-JOIN = "import ray, sys; ray.init(sys.argv[1], log_to_driver=False, logging_level='ERROR')"
+ANSWER_TIMEOUT_S = 4.0  # until a cluster has answered
+JOIN_TIMEOUT_S = 14.0  # until a process has joined it
+JOIN_SCRIPT = "import ray, sys; ray.init(sys.argv[1], log_to_driver=False, logging_level='ERROR')"
 SETTINGS = b"\x04"  # type of the first frame of any HTTP/2 server, gRPC servers included
-HELLO = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + b"\0\0\0" + SETTINGS + b"\0" * 5
-RETRIES = 3  # of a job whose worker or node is lost
-STORE = 80 * 2**20  # bytes of shared memory for a cluster on this machine: results are a few kB
+HTTP2_PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + b"\0\0\0" + SETTINGS + b"\0" * 5
+MAX_RETRIES = 3  # of a job whose worker or node is lost
+OBJECT_STORE_BYTES = 80 * 2**20  # bytes of shared memory for a cluster on this machine: results are a few kB
 
 
 def run_on_ray(work: Work, jobs: Iterable[Job], workers: int, address: str | None, on_wait: Callable[[], None]) -> Runs:
@@ -41,7 +41,7 @@ def run_on_ray(work: Work, jobs: Iterable[Job], workers: int, address: str | Non
     ours = not ray.is_initialized()
     if ours:
         _connect(ray, address, workers)
-    do = ray.remote(_on_node).options(num_cpus=1, max_retries=RETRIES)
+    do = ray.remote(_on_node).options(num_cpus=1, max_retries=MAX_RETRIES)
     wanted, left, running = software(), iter(jobs), dict[Any, Job]()
     cores = _cores(ray)
     try:
@@ -74,7 +74,11 @@ def _ray() -> Any:
 
 def _connect(ray: Any, address: str | None, workers: int) -> None:
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # Ray's usage reports are off unless the user enables them
-    own = {"num_cpus": workers, "object_store_memory": STORE, "include_dashboard": False} if address is None else {}
+    own = (
+        {"num_cpus": workers, "object_store_memory": OBJECT_STORE_BYTES, "include_dashboard": False}
+        if address is None
+        else {}
+    )
     try:
         ray.init(address or "local", log_to_driver=False, logging_level="ERROR", **own)
     except Exception as error:  # it raises these, too
@@ -108,9 +112,9 @@ def check_address(address: str) -> None:
 
 def _refusal(address: str) -> str:
     """Return the reason why a process cannot join a cluster in time; empty if it can."""
-    command = [sys.executable, "-c", JOIN, address]
+    command = [sys.executable, "-c", JOIN_SCRIPT, address]
     try:
-        outcome = subprocess.run(command, capture_output=True, text=True, timeout=JOINED, check=False)
+        outcome = subprocess.run(command, capture_output=True, text=True, timeout=JOIN_TIMEOUT_S, check=False)
     except subprocess.TimeoutExpired:
         return "it does not let a process join"
     return "" if outcome.returncode == 0 else (outcome.stderr.strip().splitlines() or ["no reason given"])[-1]
@@ -119,8 +123,8 @@ def _refusal(address: str) -> str:
 def _silence(host: str, port: int) -> str:
     """Return the reason why there is no gRPC server; empty if there is one."""
     try:
-        with socket.create_connection((host, port), timeout=ANSWER) as connection:
-            connection.sendall(HELLO)
+        with socket.create_connection((host, port), timeout=ANSWER_TIMEOUT_S) as connection:
+            connection.sendall(HTTP2_PREFACE)
             answer = connection.recv(64)
     except (OSError, OverflowError, UnicodeError) as error:
         return str(error)
