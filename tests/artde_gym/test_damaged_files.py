@@ -54,7 +54,7 @@ seed: 3
 episodes: 2
 gains: {tde: {k_p_p: 8.0}}
 disturbances:
-  payload: {mass: 0.2, drop: 0.1}
+  payload: {mass: 0.2, detach_time: 0.1}
 env_kwargs: {engine: mujoco, duration: 0.1}
 grid:
   controller: [tde, artde]

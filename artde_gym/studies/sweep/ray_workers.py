@@ -107,7 +107,9 @@ def check_address(address: str) -> None:
     reasons = [_silence(one, int(port)) for one in hosts]
     reason = _refusal(address) if "" in reasons else reasons[-1]
     if reason:
-        raise OptionError("address", address, f"the address of a Ray cluster that answers within 20 s ({reason})")
+        raise OptionError(
+            "address", address, f"the address of a running Ray cluster that answers within 20 s ({reason})"
+        )
 
 
 def _refusal(address: str) -> str:
