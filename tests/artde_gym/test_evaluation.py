@@ -297,7 +297,7 @@ def test_a_folder_with_other_results_is_refused(tmp_path: Path) -> None:
         short(["tde"], episodes=1, out=tmp_path / "mine")
     (tmp_path / "broken").mkdir()
     (tmp_path / "broken" / "summary.json").write_text("{")
-    with pytest.raises(StoreError, match="can be read"):
+    with pytest.raises(StoreError, match="readable"):
         short(["tde"], episodes=1, out=tmp_path / "broken")
 
 
