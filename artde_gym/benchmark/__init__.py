@@ -1,4 +1,4 @@
-"""Speed and memory of this machine and this release, as ratios measured in one run."""
+"""Speed and memory on this machine with this release, as ratios measured in one run."""
 
 from artde_gym.benchmark.figure import Figure, Section
 from artde_gym.benchmark.run import SECTIONS, measure

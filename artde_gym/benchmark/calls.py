@@ -1,4 +1,4 @@
-"""What a call of a controller costs."""
+"""Time of a controller's call."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from artde_gym.errors import UnknownNameError
 from artde_gym.registration import make_controller, registered_controllers
 
 MANY = 1024
-"""Vehicles that are driven with one call."""
+"""Number of vehicles that one call drives."""
 
 
 class _Calls:
-    """A controller that is asked again and again what to do at the start of an episode."""
+    """A controller that is called repeatedly with the first observation of an episode."""
 
     def __init__(self, policy: Any, observation: Any) -> None:
         self._policy, self._observation = policy, observation
@@ -30,7 +30,7 @@ class _Calls:
 
 
 def calling(quick: bool) -> Section:
-    """Microseconds a call of every controller, for each robot that it drives, and for many vehicles with one call."""
+    """Measure every controller's call, for each robot that it drives, and for many vehicles at once."""
     figures = []
     for name, env in {"biped": biped(), "quadrotor": quadrotor(), f"{MANY} quadrotors": fleet(MANY)}.items():
         observation, _ = env.reset(seed=0)
@@ -44,7 +44,7 @@ def calling(quick: bool) -> Section:
         times = in_turns(variants, (2 if quick else 20) if env.observation_space.shape[0] == MANY else 40)
         env.close()
         for controller, seconds in times.items():
-            figures.append(Figure(f"{name}, {controller}", 1e6 * seconds / TURN, "us a call"))
+            figures.append(Figure(f"{name}, {controller}", 1e6 * seconds / TURN, "us per call"))
             if controller != "tde":
                 figures.append(Figure(f"{name}, {controller}: against TDE", seconds / times["tde"]))
     text = f"The same observation over and over, float64, on one core; {MANY} vehicles are one call for all of them."

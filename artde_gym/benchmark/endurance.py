@@ -1,4 +1,4 @@
-"""Whether anything changes over hours in one process: memory, speed, physics clients that nobody closed."""
+"""Drift over hours in one process: memory, speed, and physics clients left open."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from artde_gym.sim.engine_loops import open_clients
 
 GROWTH = 10.0  # MB, at most
 DRIFT = 0.9
-"""Speed of the last quarter over that of the first, at least."""
+"""Lowest ratio of the last quarter's speed to the first's."""
 WALK = 58.0  # s
 WARM = 3
-"""Episodes before memory is looked at: caches fill."""
+"""Episodes before memory is measured: caches fill."""
 _SHORT: dict[str, dict[str, Any]] = {
     "BipedWalk-Payload-v0": {"duration": 0.1, "control_period": 0.004, "actuator_inertia": "lumped"},
     "BipedPush-v0": {"duration": 0.1, "control_period": 0.004, "actuator_inertia": "lumped"},
@@ -34,7 +34,7 @@ Progress = Callable[[str], None]
 
 
 def walking(engine: str, seconds: float, told: Progress = lambda _: None) -> tuple[Figure, ...]:
-    """So many simulated seconds of scenario S2 under ARTDE, walk after walk in one environment."""
+    """Run `seconds` simulated seconds of scenario S2 under ARTDE, walk after walk in one environment."""
     env = biped(engine=engine, duration=min(WALK, seconds), disturbances=SCENARIOS["S2"].disturbances)
     policy = make_controller("artde", env)
     walked, rates, memory, number = 0.0, [], [], 0
@@ -52,7 +52,7 @@ def walking(engine: str, seconds: float, told: Progress = lambda _: None) -> tup
 
 
 def starting(episodes: int, told: Progress = lambda _: None) -> tuple[Figure, ...]:
-    """So many short episodes in turns over all environments and engines, which stay open."""
+    """Run `episodes` short episodes in turns over all environments and engines, which stay open."""
     envs = [_made(name, engine) for name in _SHORT for engine in ENGINES]
     policies = [make_controller("artde", env) for env in envs]
     rates, memory = [], []
@@ -70,7 +70,7 @@ def starting(episodes: int, told: Progress = lambda _: None) -> tuple[Figure, ..
 
 
 def making(count: int, told: Progress = lambda _: None) -> tuple[Figure, ...]:
-    """So many environments, one after the other, each for an episode; every other one is forgotten, not closed."""
+    """Make `count` environments one after another, each for an episode; every other one is dropped without closing."""
     places = [(name, engine) for engine in ENGINES for name in _SHORT]
     clients = open_clients()
     figures: list[Figure] = []
@@ -91,9 +91,9 @@ def making(count: int, told: Progress = lambda _: None) -> tuple[Figure, ...]:
 
 
 def replacing(count: int, told: Progress = lambda _: None) -> tuple[Figure, ...]:
-    """So many environments, each in the place of an older one, while others of both engines are open; for an episode.
+    """Replace `count` environments, each for an episode, while others of both engines stay open.
 
-    What engines give back so lies between what others hold, and the C library can use it again only if it fits.
+    Memory that engines free then lies between blocks in use, and the C library can reuse it only if it fits.
     """
     places = [(name, engine) for name in _SHORT for engine in ENGINES]
     clients = open_clients()

@@ -1,4 +1,4 @@
-"""What a benchmark finds."""
+"""Measured figures and their sections."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ class Figure:
     """One measured number.
 
     Attributes:
-        what: as a reader will see it.
+        what: description for readers.
         value: in `unit`.
         unit: "1" for a ratio, which holds on any machine.
-        least: what it should be at least, if anything.
-        most: what it should be at most, if anything.
+        least: lower target, if any.
+        most: upper target, if any.
     """
 
     what: str
@@ -25,14 +25,14 @@ class Figure:
 
     @property
     def met(self) -> bool | None:
-        """Whether it is what it should be; None if nothing was asked."""
+        """Result of the comparison with the target; None without one."""
         if self.least is None and self.most is None:
             return None
         return (self.least is None or self.value >= self.least) and (self.most is None or self.value <= self.most)
 
     @property
     def target(self) -> str:
-        """What it should be, in words."""
+        """The target in words."""
         bounds = ((">=", self.least), ("<=", self.most))
         return ", ".join(f"{sign} {bound:g}" for sign, bound in bounds if bound is not None)
 
@@ -43,9 +43,9 @@ class Section:
 
     Attributes:
         title: of the section.
-        text: what was measured, and how.
-        figures: what was found.
-        skipped: why there are none, or not all of them; empty if there are.
+        text: description of the measurement.
+        figures: measured figures.
+        skipped: reason for missing figures; empty without any.
     """
 
     title: str

@@ -1,4 +1,4 @@
-"""How fast quadrotors fly: one in an engine, thousands in NumPy."""
+"""Speed of quadrotors: one in an engine, thousands in NumPy."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from artde_gym.benchmark.timing import TURN, ClosedLoop, Replay, in_turns
 from artde_gym.sim.engine_loops import body_loop
 
 PERIODS = 2000  # of 15 ms: half a minute of flight
-PHYSICS_STEPS = 15  # a period
+PHYSICS_STEPS = 15  # per control period
 LOADS: dict[str, dict[str, Any] | None] = {"payload and wind": None, "nothing else": {}}
 SIZES = {1: ("float64",), 16: ("float64",), 256: ("float64",), 1024: ("float64", "float32"),
          4096: ("float64", "float32")}  # fmt: skip
 LEAST = {1024: 0.8, 4096: 1.5}
-"""Millions of control periods a second in closed loop that the project wants of float64, by number of vehicles."""
+"""Target in millions of control periods per second, closed loop with float64, by number of vehicles."""
 
 
 class _BareFlight(Replay):
@@ -31,7 +31,7 @@ class _BareFlight(Replay):
 
 
 def flying(quick: bool) -> Section:
-    """Rates of the same flight in closed loop, in the environment alone and in the bare engine."""
+    """Measure the same flight in closed loop, in the environment alone and in the bare engine."""
     variants = {}
     for engine in ENGINES:
         for load, disturbances in LOADS.items():
@@ -50,7 +50,7 @@ def flying(quick: bool) -> Section:
             name = f"{written}, {load}"
             if load == "nothing else":
                 figures.append(Figure(f"{written}, bare: {PHYSICS_STEPS} times write the wrench and step, read once",
-                                      1e6 * bare / TURN, "us a period"))  # fmt: skip
+                                      1e6 * bare / TURN, "us per period"))  # fmt: skip
             least = 0.5 if engine == "bullet" else None
             figures.append(Figure(f"{name}, env.step: rate against bare", bare / times[engine, load, "environment"],
                                   least=least))  # fmt: skip
@@ -64,7 +64,7 @@ def flying(quick: bool) -> Section:
 
 
 def fleets(quick: bool) -> Section:
-    """Rates of many quadrotors in NumPy, against how many there are."""
+    """Measure many quadrotors in NumPy, by number of vehicles."""
     figures = []
     alone = None
     for size, types in SIZES.items():
@@ -82,6 +82,6 @@ def fleets(quick: bool) -> Section:
             ]
     text = (
         f"Control periods of 15 ms in the default disturbances, all vehicles together, on one core; {TURN} periods at "
-        "a time in turns, ARTDE driving all of them with one call a period."
+        "a time in turns; one call of ARTDE per period drives all of them."
     )
     return Section("Many quadrotors in NumPy", text, tuple(figures))

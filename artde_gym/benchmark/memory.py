@@ -1,4 +1,4 @@
-"""Whether memory grows."""
+"""Growth of memory over steps and resets."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ STEPS, RESETS = 20_000, 200
 
 
 def growing(quick: bool) -> Section:
-    """Growth of the resident memory over resets and steps, after a warm-up."""
+    """Measure the growth of resident memory over resets and steps, after a warm-up."""
     if not MEMORY.exists():
         return Section("Memory", "", skipped=f"{platform.system()} does not tell a process its memory in /proc")
     share = 10 if quick else 1
@@ -30,7 +30,7 @@ def growing(quick: bool) -> Section:
         env.close()
     vehicles = fleet(1024)
     vehicles.reset(seed=0)
-    still = np.zeros((1024, 4))  # they fall, and begin anew about every half second
+    still = np.zeros((1024, 4))  # they fall, and restart about every half second
     for _ in range(100):
         vehicles.step(still)
     before = resident()

@@ -1,4 +1,4 @@
-"""A benchmark as a file for programs, and as a page for people."""
+"""Output of a benchmark as JSON, and as a page."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from artde_gym.evaluation.provenance import provenance
 INTRODUCTION = """\
 # Benchmark
 
-Times are one machine's; ratios, which have no unit, were measured in one run, all variants in turns, and hold
-elsewhere, too. A target that was missed is marked. The same command writes this page on your machine:
+Times hold for one machine; ratios (no unit) were measured in one run, all variants in turns, and hold elsewhere, too. A
+missed target is marked. This command writes the page on your machine:
 
     {command}
 
@@ -25,13 +25,13 @@ elsewhere, too. A target that was missed is marked. The same command writes this
 
 
 def record(found: Mapping[str, Section]) -> dict[str, Any]:
-    """Everything that was found, with its origin, for JSON."""
+    """Return all results with their provenance, for JSON."""
     sections = {name: _record(section) for name, section in found.items()}
     return {"provenance": provenance(), "machine": machine(), "sections": sections}
 
 
 def page(found: Mapping[str, Section]) -> str:
-    """Everything that was found as Markdown."""
+    """Return all results as Markdown."""
     origin, here = provenance(), machine()
     versions = ", ".join(f"{name} {version}" for name, version in origin["packages"].items())
     about = f"{here['processor']}, {here['cores']} cores; Python {origin['python']}, {versions}; {origin['time']}."
@@ -48,7 +48,7 @@ def page(found: Mapping[str, Section]) -> str:
 
 
 def machine() -> dict[str, Any]:
-    """Processor and number of cores."""
+    """Return processor and number of cores."""
     processor = platform.processor() or platform.machine() or "an unknown processor"
     try:
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
@@ -61,7 +61,7 @@ def machine() -> dict[str, Any]:
 
 
 def written(value: float) -> str:
-    """A number with three significant digits, without an exponent."""
+    """Format a number with three significant digits, without an exponent."""
     if not abs(value) < 1000:
         return f"{value:,.0f}".replace(",", " ")
     digits = max(0, 2 - (len(f"{abs(value):.0f}") - 1)) if abs(value) >= 1 else 3

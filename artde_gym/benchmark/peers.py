@@ -1,4 +1,4 @@
-"""Other people's quadrotors beside ours, where they are installed; none of them is a dependency."""
+"""Comparison with other quadrotor environments, if they are installed; none of them is a dependency."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MANY = 1024
 
 
 def peers(quick: bool) -> Section:
-    """Simulated seconds of flight that each environment gives in a second, and ours over theirs."""
+    """Measure simulated seconds of flight per second of each environment, and our rate relative to theirs."""
     figures: list[Figure] = []
     left_out = []
     pairs: dict[str, tuple[str, Callable[[], _Flyer], Callable[[], _Flyer]]] = {
@@ -37,7 +37,7 @@ def peers(quick: bool) -> Section:
                 warnings.simplefilter("ignore")  # theirs
                 theirs, ours = make_theirs(), make_ours()
                 times = in_turns({"theirs": theirs.turn, "ours": ours.turn}, 2 if quick else 20, time.perf_counter)
-        except Exception as error:  # of a release that is not as the one that this was written for
+        except Exception as error:  # of a release other than the one this was written for
             left_out.append(f"{name} does not run here ({type(error).__name__}: {error})")
             continue
         rates = {who: flyer.seconds / times[who] for who, flyer in (("theirs", theirs), ("ours", ours))}
@@ -47,14 +47,14 @@ def peers(quick: bool) -> Section:
             Figure(f"ours against {name}: rate", rates["ours"] / rates["theirs"]),
         ]
     text = (
-        "Environments alone, calm air, on the processor by the clock on the wall. They are not the same task: physics "
-        "steps, models of rotors and drag, and periods of control differ, so the common measure is simulated time."
+        "Environments alone, calm air, on the processor, by wall-clock time. They are not the same task: physics "
+        "steps, models of rotors and drag, and control periods differ, so the common measure is simulated time."
     )
     return Section("Beside other packages", text, tuple(figures), "; ".join(left_out))
 
 
 class _Flyer:
-    """An environment whose vehicles are given one and the same action."""
+    """An environment whose vehicles all repeat the same action."""
 
     def __init__(self, env: Any, period: float, action: Any = None) -> None:
         self._env = env
@@ -72,7 +72,7 @@ class _Flyer:
         rewards = None
         for _ in range(TURN):
             _, rewards, *_ = self._env.step(self._action)
-        np.asarray(rewards)  # waits for what runs asynchronously
+        np.asarray(rewards)  # waits for asynchronous computations
 
 
 def _aviary() -> _Flyer:

@@ -1,4 +1,4 @@
-"""What a reset costs."""
+"""Time of a reset."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ STARTS: dict[str, tuple[Any, Mapping[str, Any], float | None]] = {
     "biped with a payload that settles for 0.3 s": (biped, {"payload": 1.3}, None),
     "quadrotor": (quadrotor, {"payload": 0.35, "wind": 1.0}, 2.0),
 }
-"""What starts -> (environment, disturbances, milliseconds at most)."""
+"""Case -> (environment, disturbances, target in milliseconds)."""
 
 
 def resetting(quick: bool) -> Section:
-    """Milliseconds of resets, and how many steps could have been done meanwhile."""
+    """Measure resets in milliseconds, and relative to a step."""
     figures = []
     for engine, written in ENGINES.items():
         for name, (make, disturbances, most) in STARTS.items():
@@ -38,7 +38,7 @@ def resetting(quick: bool) -> Section:
 
 
 def _median(count: int, job: Any) -> float:
-    """Seconds of `job(number)`."""
+    """Return the median time (s) of `job(number)`."""
     times = []
     for number in range(count):
         start = time.perf_counter()

@@ -1,4 +1,4 @@
-"""All sections of the benchmark by name, and running some of them."""
+"""Sections of the benchmark by name, and running them."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ SECTIONS: dict[str, str] = {
     "peers": "artde_gym.benchmark.peers:peers",
     **pointed("artde_gym.benchmarks"),
 }
-"""Name -> "module:function", called as function(quick) and giving a `Section`: our own, then those of the entry points
-"artde_gym.benchmarks". Strings, so that a section may need what is not installed."""
+"""Name -> "module:function", called as function(quick) to return a `Section`: our own, then those of the entry points
+"artde_gym.benchmarks". They are strings, since a section may need packages that are not installed."""
 
 
 def measure(
     names: Sequence[str] | None = None, *, quick: bool = False, on_section: Callable[[str], None] | None = None
 ) -> dict[str, Section]:
-    """Measure some sections, or all, in this process, one after the other.
+    """Measure some sections, or all, in this process, one after another.
 
     Args:
-        names: of `SECTIONS`.
-        quick: a tenth of the work: for a look, not for a page.
-        on_section: called with the name of each before it begins.
+        names: keys of `SECTIONS`; None for all.
+        quick: a tenth of the work: for a quick look, not for the page.
+        on_section: called with each section's name before it begins.
 
     Raises:
-        UnknownNameError: for a section that there is not.
+        UnknownNameError: for an unknown section.
     """
     for name in names or ():
         if name not in SECTIONS:

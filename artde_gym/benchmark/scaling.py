@@ -1,4 +1,4 @@
-"""What several processes gain."""
+"""Speedup by several processes."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ STEPS = {"biped": 8000, "quadrotor": 3500}
 MAKERS = {"biped": biped, "quadrotor": quadrotor}
 
 _started: dict[str, Any] = {}
-"""A worker's own: the barrier at which all of them wait for each other."""
+"""State of a worker: the barrier at which all of them wait for each other."""
 
 
 def scaling(quick: bool) -> Section:
-    """Control periods a second of as many closed loops as there are processes, against those of one."""
+    """Measure control periods per second of one closed loop per process, relative to one process."""
     cores = os.cpu_count() or 1
     counts = sorted({1, *(count for count in (2, 4, 8, 16, 32, 64) if count < cores), cores})
     figures = []
@@ -35,14 +35,14 @@ def scaling(quick: bool) -> Section:
                 least = 1.8 if count == 2 else None
                 figures.append(Figure(f"{robot}, {count} processes: rate against 1", rate / alone, least=least))
     text = (
-        f"Closed loops with ARTDE in PyBullet, one in each process, on a machine of {cores} cores, by the clock on the "
-        "wall from the first one's start to the last one's end; building environments is left out."
+        f"Closed loops with ARTDE in PyBullet, one per process, on a machine with {cores} cores, by wall-clock time "
+        "from the first one's start to the last one's end; building environments is left out."
     )
     return Section("Several processes", text, tuple(figures))
 
 
 def _rate(robot: str, count: int, steps: int) -> float:
-    """Control periods a second of `count` processes together."""
+    """Return control periods per second of `count` processes together."""
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(count, context, _start, (context.Barrier(count),)) as pool:
         spans = [future.result() for future in [pool.submit(_run, robot, steps) for _ in range(count)]]
@@ -54,7 +54,7 @@ def _start(barrier: Any) -> None:
 
 
 def _run(robot: str, steps: int) -> tuple[float, float]:
-    """When `steps` of a closed loop began and ended (s, on a clock that all processes share)."""
+    """Run `steps` of a closed loop; return begin and end (s, on a clock that all processes share)."""
     loop = ClosedLoop("artde", MAKERS[robot](duration=58.0), turn=1)
     advance = loop.turn()
     advance()

@@ -1,4 +1,4 @@
-"""How things are timed: all variants in turns, each by its own computing time."""
+"""Timing of variants in turns, each by its own computing time."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from artde_gym.errors import OptionError
 from artde_gym.registration import make_controller
 
 TURN = 50
-"""Steps that a variant does before it is the next one's turn."""
+"""Steps of a variant before the next one's turn."""
 
 Job = Callable[[], None]
 Key = TypeVar("Key", bound=Hashable)
@@ -25,15 +25,15 @@ Key = TypeVar("Key", bound=Hashable)
 def in_turns(
     variants: Mapping[Key, Callable[[], Job]], rounds: int, clock: Callable[[], float] = time.process_time
 ) -> dict[Key, float]:
-    """Seconds that each variant takes for its job of a round, which it prepares untimed.
+    """Measure the seconds that each variant takes for its job of a round, which it prepares untimed.
 
-    All of them advance in turns, so that a machine whose speed drifts is as fast for each; a variant's time is the
-    median of its turns, which a burst of other work on the machine does not move.
+    All of them advance in turns, so that drift of the machine's speed affects all equally; a variant's time is the
+    median of its turns, which is insensitive to bursts of other work.
 
     Args:
-        variants: key -> what prepares a job.
-        rounds: of all variants.
-        clock: computing time of this process, other processes' left out; `time.perf_counter` for threads and workers.
+        variants: key -> function that prepares a job.
+        rounds: number of rounds of all variants.
+        clock: by default this process's computing time; `time.perf_counter` for threads and workers.
     """
     turns: dict[Key, list[float]] = {key: [] for key in variants}
     for _ in range(rounds):
@@ -46,7 +46,7 @@ def in_turns(
 
 
 class ClosedLoop:
-    """A controller drives an environment, or a vector of them; `actions` remembers how."""
+    """A controller that drives an environment, or a vector of them; `actions` records its actions."""
 
     def __init__(self, name: str, env: Any, turn: int = TURN) -> None:
         self.env, self._turn = env, turn
@@ -66,7 +66,7 @@ class ClosedLoop:
 
 
 class Replay:
-    """The last actions of a closed loop once more, in an environment alone."""
+    """Repetition of a closed loop's last actions, in an environment alone."""
 
     def __init__(self, loop: ClosedLoop, env: Any, turn: int = TURN) -> None:
         self.loop, self.env, self._turn = loop, env, turn
@@ -82,16 +82,16 @@ class Replay:
         return job
 
     def convert(self, action: np.ndarray) -> Any:
-        """An action as `step` takes it; not timed."""
+        """Convert an action to the form that `step` takes; not timed."""
         return action
 
     def step(self, action: Any) -> None:
-        """One control period."""
+        """Run one control period."""
         self.env.step(action)
 
 
 MEMORY = Path("/proc/self/statm")
-"""Where Linux tells the memory of a process; other systems do not have it."""
+"""Memory of this process on Linux; other systems do not have the file."""
 
 
 def resident() -> int:
@@ -101,6 +101,6 @@ def resident() -> int:
         OptionError: on systems other than Linux.
     """
     if not MEMORY.exists():
-        raise OptionError("operating system", platform.system(), "Linux, which tells a process its memory in /proc")
+        raise OptionError("operating system", platform.system(), "Linux, which reports a process's memory in /proc")
     pages = int(MEMORY.read_text(encoding="ascii").split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE")

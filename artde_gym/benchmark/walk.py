@@ -1,4 +1,4 @@
-"""How fast the biped walks."""
+"""Speed of the biped's walk."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from artde_gym.sim.engine_loops import joint_loop
 
 STEPS = 5900  # two seconds of standing, two steps, standing again
 LEAST = {("bullet", "environment"): 0.85, ("bullet", "artde"): 0.75}
-"""Rates against the bare engine that the project wants, by engine and variant."""
+"""Target rates against the bare engine, by engine and variant."""
 
 
 class BareWalk(Replay):
@@ -25,7 +25,7 @@ class BareWalk(Replay):
 
 
 def walking(quick: bool) -> Section:
-    """Rates of the same walk in closed loop, in the environment alone and in the bare engine."""
+    """Measure the same walk in closed loop, in the environment alone and in the bare engine."""
     variants = {}
     for engine in ENGINES:
         tde, artde = (ClosedLoop(name, biped(engine=engine)) for name in ("tde", "artde"))
@@ -39,7 +39,7 @@ def walking(quick: bool) -> Section:
     figures = []
     for engine, written in ENGINES.items():
         bare = times[engine, "bare"]
-        figures.append(Figure(f"{written}, bare: write torques, step, read joints", 1e6 * bare / TURN, "us a step"))
+        figures.append(Figure(f"{written}, bare: write torques, step, read joints", 1e6 * bare / TURN, "us per step"))
         for variant, text in (("environment", "env.step"), ("tde", "closed loop TDE"), ("artde", "closed loop ARTDE")):
             ratio, least = bare / times[engine, variant], LEAST.get((engine, variant))
             figures.append(Figure(f"{written}, {text}: rate against bare", ratio, least=least))
@@ -50,5 +50,5 @@ def walking(quick: bool) -> Section:
         f"A walk of {STEPS} steps at a control period of 1 ms (a physics step each) with a payload and geared rotors, "
         "on one core. The environment alone and the bare engine repeat the torques of ARTDE's closed loop."
     )
-    skipped = "" if len(ENGINES) > 1 else "its part in PyBullet, which is not installed: see `artde-gym doctor`"
+    skipped = "" if len(ENGINES) > 1 else "the PyBullet part: PyBullet is not installed; see `artde-gym doctor`"
     return Section("The biped", text, tuple(figures), skipped)

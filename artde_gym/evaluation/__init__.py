@@ -1,4 +1,4 @@
-"""The harness that judges policies: seeded episodes, metrics, statistics and results folders."""
+"""The evaluation harness: seeded episodes, metrics, statistics and results folders."""
 
 from artde_gym.deprecation import moved
 from artde_gym.evaluation.evaluate import evaluate

@@ -1,4 +1,4 @@
-"""One spelling for what means the same, so that cases are told apart by their meaning."""
+"""Canonical forms of names, arguments and disturbances, so that equal cases compare equal."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from artde_gym.errors import ArtdeGymError
 from artde_gym.evaluation.environments import arguments_of, ours, robot_of
 
 EXACT = 2**53
-"""Whole numbers below it are floats without rounding."""
+"""Whole numbers below this are exact as floats."""
 
 
 def name(text: str) -> str:
-    """Write a name without surrounding space, in one of Unicode's forms."""
+    """Return a name without surrounding space, in Unicode's normal form NFC."""
     return unicodedata.normalize("NFC", text.strip())
 
 
@@ -32,7 +32,7 @@ def twice(names: Iterable[str]) -> str | None:
 
 
 def numbers(value: Any) -> Any:
-    """Write whole numbers as such, in mappings and lists too: 1.0 is 1."""
+    """Return whole numbers as integers, in mappings and lists too: 1.0 becomes 1."""
     if isinstance(value, Mapping):
         return {key: numbers(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
@@ -42,14 +42,14 @@ def numbers(value: Any) -> Any:
 
 
 def disturbances(given: Mapping[str, Any], env_id: str) -> dict[str, Any]:
-    """Write disturbances in full, with all defaults; those that no grammar knows stay as they are."""
+    """Return disturbances in full, with all defaults; kinds outside the grammar are left as they are."""
     robot = robot_of(env_id) if env_id in ours() else None
     written = {kind: _entries(kind, value, robot) if kind in DISTURBANCES else value for kind, value in given.items()}
     return {kind: numbers(value) for kind, value in written.items() if value != []}
 
 
 def arguments(given: Mapping[str, Any], env_id: str, vectorized: bool) -> dict[str, Any]:
-    """Write an environment's arguments without those that have their defaults, its disturbances in full."""
+    """Return an environment's arguments without those at their defaults, its disturbances in full."""
     try:
         known = arguments_of(env_id, vectorized) if env_id in ours() else {}
     except ArtdeGymError:

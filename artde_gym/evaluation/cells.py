@@ -1,4 +1,4 @@
-"""Cells: what is run of an environment, as named scenarios or as it is."""
+"""Cells: the environments to run, from named scenarios or from plain arguments."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from artde_gym.scenarios import scenario as find_scenario
 
 DEFAULT_ENVIRONMENT = "BipedWalk-Payload-v0"
 CUSTOM = "custom"
-"""Name of the scenario when an environment is evaluated as it is."""
+"""Name of the scenario for an environment that is evaluated with plain arguments."""
 
 
 class Cell(NamedTuple):
-    """One scenario to run, as plain data that a worker can read."""
+    """One scenario to run, as plain data that can be sent to a worker."""
 
     name: str
     env_id: str
@@ -35,20 +35,18 @@ def cells_of(
     disturbances: Mapping[str, Any] | None,
     vectorized: bool = False,
 ) -> list[Cell]:
-    """Find what to run of an environment: named scenarios, or it as it is; arguments as for `evaluate`.
+    """Return the cells to run: the named scenarios, or the environment itself; arguments as for `evaluate`.
 
-    Each one names the engine that it runs in, so that a folder begun in one engine is not continued in another.
+    Each cell names its engine, so that a folder begun in one engine is not continued in another.
 
     Raises:
-        UnknownNameError, OptionError: for an unknown scenario, or one of another environment.
+        UnknownNameError, OptionError: for an unknown scenario, or a scenario of another environment.
     """
     if not (env_id is None or isinstance(env_id, str)):
         raise OptionError("env_id", env_id, "the id of an environment, or None")
-    kwargs = _mapping("env_kwargs", kwargs or {}, "a mapping of arguments of the environment")
+    kwargs = _mapping("env_kwargs", kwargs or {}, "a mapping of environment arguments")
     if "disturbances" in kwargs:
-        raise OptionError(
-            "env_kwargs", "disturbances", "environment arguments; disturbances have an argument of their own"
-        )
+        raise OptionError("env_kwargs", "disturbances", "environment arguments; pass disturbances as `disturbances`")
     if disturbances is not None:
         disturbances = _mapping("disturbances", disturbances, "a mapping of kinds to their parameters")
         disturbances = current_disturbances(disturbances, told=True)
@@ -65,14 +63,14 @@ def cells_of(
 
 
 def _scenarios(env_id: str | None, names: str | Sequence[str]) -> list[Scenario]:
-    """Find the scenarios of these names, all of them of the environment if one is given."""
+    """Return the scenarios of these names; all of them must belong to the environment if one is given."""
     if not isinstance(names, Iterable):
-        raise OptionError("scenario", names, "a name or several, or None")
+        raise OptionError("scenario", names, "a name, several names, or None")
     entries = [find_scenario(name) for name in ([names] if isinstance(names, str) else names)]
     if not entries:
         raise OptionError("scenario", names, "at least one name, or None")
     if again := canonical.twice(entry.name for entry in entries):
-        raise OptionError("scenario", again, "each name once: its episodes would count twice")
+        raise OptionError("scenario", again, "each name once")
     for entry in entries:
         if env_id not in (None, entry.env_id):
             raise OptionError(f"environment of scenario {entry.name!r}", env_id, repr(entry.env_id))
@@ -86,15 +84,15 @@ def _mapping(field: str, value: Any, allowed: str) -> dict[str, Any]:
 
 
 def validate_cell(vectorized: bool, cell: Cell) -> Any:
-    """Build an environment for a cell, whose arguments and disturbances have then been found good.
+    """Build an environment for a cell, which validates its arguments and disturbances.
 
     Raises:
-        OptionError, DisturbanceError: if they are not.
+        OptionError, DisturbanceError: for an invalid argument or disturbance.
     """
     try:
         json.dumps(cell.kwargs)
     except TypeError as error:
-        raise OptionError("env_kwargs", cell.kwargs, "values that JSON can write") from error
+        raise OptionError("env_kwargs", cell.kwargs, "values that JSON can store") from error
     metrics_spec_of(cell.env_id)
     env, options = vector_of([cell], vector_of_one) if vectorized else single_of(cell)
     env.reset(options=options)
@@ -102,7 +100,7 @@ def validate_cell(vectorized: bool, cell: Cell) -> Any:
 
 
 def single_of(cell: Cell) -> tuple[Any, dict[str, Any] | None]:
-    """Build an environment, and options for its resets: cells that differ by disturbances alone share one."""
+    """Return an environment, and options for its resets; cells that differ only by disturbances share one."""
     if "disturbances" not in cell.kwargs:
         return single(cell.env_id, json.dumps(cell.kwargs)), None
     options = {"disturbances": cell.kwargs["disturbances"]}

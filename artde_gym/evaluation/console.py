@@ -1,4 +1,4 @@
-"""A result as tables for a terminal, the thesis' numbers beside ours."""
+"""Tables of a result for a terminal, beside the numbers of the thesis."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from artde_gym.metrics_spec import MetricsSpec
 from artde_gym.scenarios import SCENARIOS
 
 UNITS = {"deg": ("deg", 3), "m": ("m", 4), "nm": ("Nm", 3), "n": ("N", 3)}
-"""Unit in a column's name -> how it is written, and with how many digits."""
-DIGITS = 4  # of a metric of another unit
+"""Unit in a column's name -> how it is printed, and its number of digits."""
+DIGITS = 4  # of metrics with another unit
 REFERENCE = "artde"
-"""The controller that all others are compared with, if it was evaluated: the claims are about this one."""
-ALL = "all"  # axes together
-TOGETHER = 3  # columns of controllers, or of comparisons, that fit a terminal
-ACROSS = 4  # columns of axes that do
-NARROW = 110  # characters of a terminal, below which a table of claims is a ribbon of words
-WIDE = 6  # columns of controllers that do with a space on either side
+"""The controller that all others are compared with, if it was evaluated: the claims concern this one."""
+ALL = "all"  # all axes together
+TOGETHER = 3  # columns of controllers or comparisons that fit a terminal
+ACROSS = 4  # columns of axes that fit
+NARROW = 110  # characters; a narrower terminal shows claims as paragraphs instead of a table
+WIDE = 6  # columns of controllers that still leave a space on either side
 _VERDICTS = {"holds": "green", "does not hold": "red", "undecided": "yellow", "not measured": "dim"}
 
 
@@ -74,7 +74,7 @@ def _print_paragraphs(verdicts: pd.DataFrame, console: Console) -> None:
 
 
 class _Tables:
-    """All tables of a result; means and comparisons are computed once."""
+    """All tables of a result; each mean and comparison is computed once."""
 
     def __init__(self, result: Result) -> None:
         self._result = result
@@ -117,7 +117,7 @@ class _Tables:
         return table
 
     def _metric(self, scenario: str, reference: str | None, metric: str, title: str, axes: list[str]) -> list[Table]:
-        """Two rows an axis, ours and the thesis'. Few controllers and their comparisons share one table."""
+        """Build two rows per axis: ours, and the thesis'. Few controllers and their comparisons share one table."""
         digits = digits_of(metric)
 
         def column(axis: str) -> str:
@@ -137,7 +137,7 @@ class _Tables:
             return part
 
         def comparison() -> Table:
-            """The axes side by side, where they are few."""
+            """Build a table with the axes as columns, for few axes."""
             part = _table(f"{REFERENCE} vs (%)", "", title=title)
             for axis in axes:
                 part.add_column(axis, justify="right")
@@ -154,7 +154,7 @@ class _Tables:
         return [table(self._controllers, []), *(table([], pair) for pair in pairs)]
 
     def _events(self, scenario: str, tracking: MetricsSpec) -> list[Table]:
-        """Peak and recovery after each disturbance; the median counts a recovery that never came as the longest."""
+        """Build the table of peaks and recoveries after disturbances; a missing recovery counts as the longest."""
         unit, (text, digits) = tracking.errors[0].unit, UNITS[tracking.errors[0].unit]
         table = _table("after", "", title="after disturbances")
         table.collapse_padding = len(self._controllers) > WIDE
@@ -175,9 +175,9 @@ class _Tables:
 def measured(
     tracking: MetricsSpec, phases: Sequence[tuple[float, float]], registered: Sequence[str] = ()
 ) -> list[tuple[str, str, list[str]]]:
-    """Metrics to show, their titles and axes: each phase by itself where the scenario has phases.
+    """Return the metrics to show with their titles and axes; each phase separately if the scenario has phases.
 
-    `registered` are names of `artde_gym.evaluation.registered`, which come last and are of a whole episode.
+    `registered` are names of `artde_gym.evaluation.registered`; they come last and cover the whole episode.
     """
     own = [(name, name, [ALL]) for name in registered]
     metrics = [
@@ -200,7 +200,7 @@ def measured(
 
 
 def digits_of(metric: str) -> int:
-    """Return the digits with which a metric is written, by the unit in its name."""
+    """Return the number of digits for a metric, by the unit in its name."""
     return next((digits for unit, (_, digits) in UNITS.items() if unit in metric.split("_")), DIGITS)
 
 
@@ -219,7 +219,7 @@ def _add_pair(table: Table, name: str, ours: list[str], theirs: list[str]) -> No
 
 
 def _comparison(row: Mapping[str, float]) -> str:
-    """Relative difference of the means, with the interval of the paired difference on the same scale."""
+    """Format the relative difference of the means, with the interval of the paired difference on the same scale."""
     if row["pairs"] == 0:
         return "no pair without a fall"
     scale = row["percent"] / row["difference"] if row["difference"] else 0.0
@@ -240,14 +240,14 @@ def _number(value: float | None, digits: int) -> str:
 
 
 def share_text(share: statistics.Estimate) -> str:
-    """A share as a count with its interval: "18/20 (70..97 %)"."""
+    """Format a share as a count with its interval: "18/20 (70..97 %)"."""
     if not share.n:
         return "unknown"
     return f"{round(share.value * share.n)}/{share.n} ({100 * share.low:.0f}..{100 * share.high:.0f} %)"
 
 
 def time_text(time: float) -> str:
-    """A time (s) until something happens, which may be never."""
+    """Format the time (s) until an event; infinite means never."""
     return "-" if math.isnan(time) else "never" if math.isinf(time) else f"{time:.2f}"
 
 

@@ -1,4 +1,4 @@
-"""Registered environments by id: what they take, what they track, and one to run."""
+"""Registered environments by id: their arguments, their metrics, and instances to run."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from artde_gym.kit import ROBOTS
 from artde_gym.metrics_spec import MetricsSpec
 from artde_gym.sim.factory import ENGINES, resolve_engine
 
-"""One environment for each episode in a physics engine, or many episodes in one vector environment."""
+"""Two backends: one environment per episode in a physics engine, or many episodes in one vector environment."""
 
 PICTURES = ("width", "height", "render_mode")
-"""Arguments of environments that change their pictures alone."""
+"""Environment arguments that affect rendering only."""
 
-KEPT = 4  # environments a process; each one holds a physics client
+KEPT = 4  # environments kept per process; each one holds a physics client
 
 
 def arguments_of(env_id: str, vectorized: bool = False) -> Mapping[str, inspect.Parameter]:
-    """Arguments of an environment by name, the number of environments in a vector excepted.
+    """Return an environment's arguments by name, without the number of environments of a vector.
 
     Raises:
         gymnasium.error.Error: if there is no such environment.
-        OptionError: if it has no vector environment of its own and `vectorized` needs one.
+        OptionError: if `vectorized` is set and it has no vector environment.
     """
     known = dict(inspect.signature(load_env_creator(_entry_point(env_id, vectorized))).parameters)
     known.pop("num_envs", None)
@@ -39,7 +39,7 @@ def arguments_of(env_id: str, vectorized: bool = False) -> Mapping[str, inspect.
 
 
 def metrics_spec_of(env_id: str) -> MetricsSpec:
-    """What an environment of this project tracks.
+    """Return the metrics of an environment of this project.
 
     Raises:
         OptionError: for any other environment.
@@ -48,7 +48,7 @@ def metrics_spec_of(env_id: str) -> MetricsSpec:
 
 
 def robot_of(env_id: str) -> str:
-    """Name of the robot in an environment of this project.
+    """Return the name of the robot in an environment of this project.
 
     Raises:
         OptionError: for any other environment.
@@ -57,7 +57,7 @@ def robot_of(env_id: str) -> str:
 
 
 def with_engine(env_id: str, kwargs: Mapping[str, Any], vectorized: bool = False) -> dict[str, Any]:
-    """Return arguments of an environment with the engine that it will run in, so that records say which one it was.
+    """Return an environment's arguments with the engine that it will run in, so that records name the engine.
 
     Raises:
         OptionError: for an unknown engine.
@@ -86,37 +86,37 @@ def fastest_engine(env_id: str, engine: str | None = None) -> tuple[bool, str]:
 
 
 def physics_of(kwargs: Mapping[str, Any]) -> str:
-    """Say in which physics an environment with arguments of `with_engine` runs."""
+    """Return the title of the physics for arguments from `with_engine`."""
     name = kwargs.get("engine", "NumPy")
     return ENGINES[name].title if name in ENGINES else str(name)
 
 
 def ours() -> list[str]:
-    """Ids of the environments of all robots."""
+    """Return the ids of the environments of all robots."""
     return [entry.env_id for kit in ROBOTS.values() for entry in kit.environments]
 
 
 def main_scenarios(env_id: str) -> tuple[str, ...]:
-    """Return the scenarios that are run in an environment where none is named; empty for the environment as it is."""
+    """Return the scenarios that run by default in an environment; empty for the environment itself."""
     entries = [entry for kit in ROBOTS.values() for entry in kit.environments]
     return next((entry.main for entry in entries if entry.env_id == env_id), ())
 
 
 @functools.lru_cache(maxsize=KEPT)
 def single(env_id: str, arguments: str) -> Any:
-    """An environment by id and JSON arguments; building one takes seconds, so a few are kept.
+    """Return an environment by id and JSON arguments; building one takes seconds, so a few are cached.
 
     Raises:
-        OptionError: for an unknown argument, or as the environment itself.
+        OptionError: for an unknown argument, or one that the environment rejects.
     """
     return gym.make(env_id, disable_env_checker=True, **_checked(env_id, arguments, False))
 
 
 def vector(env_id: str, arguments: str, size: int) -> Any:
-    """A vector of `size` environments by id and JSON arguments; where it can wait, episodes that are over do.
+    """Return a vector of `size` environments by id and JSON arguments; finished episodes wait where it supports that.
 
     Raises:
-        OptionError: as of `single`, or for an environment that has no vector of its own.
+        OptionError: as for `single`, or for an environment without a vector form.
     """
     given = _checked(env_id, arguments, True)
     creator: Any = load_env_creator(_entry_point(env_id, True))
@@ -132,10 +132,10 @@ def vector_of_one(env_id: str, arguments: str, size: int = 1) -> Any:
 
 
 def drawing(env_id: str, kwargs: Mapping[str, Any], width: int) -> Any:
-    """An environment of one's own that draws pictures `width` pixels wide, and three quarters of it high.
+    """Build a separate environment that renders frames `width` pixels wide, with a height of three quarters.
 
     Raises:
-        OptionError: as of `single`, or where its engine cannot draw.
+        OptionError: as for `single`, or if its engine cannot render.
     """
     given = {"width": width, "height": 3 * width // 4, **_checked(env_id, json.dumps(kwargs), False)}
     return gym.make(env_id, disable_env_checker=True, render_mode="rgb_array", **given)
@@ -153,7 +153,7 @@ def _class(env_id: str) -> Any:
 
 def _checked(env_id: str, arguments: str, vectorized: bool) -> dict[str, Any]:
     known, given = arguments_of(env_id, vectorized), json.loads(arguments)
-    known = {name: argument for name, argument in known.items() if name != "render_mode"}  # asked for by `drawing`
+    known = {name: argument for name, argument in known.items() if name != "render_mode"}  # set by `drawing`
     for name in given:
         if name not in known:
             raise OptionError(f"argument of {env_id}", name, suggest_names(name, known))

@@ -1,4 +1,4 @@
-"""Evaluating controllers: the same seeded episodes for each of them, on several processes."""
+"""Evaluation of controllers: the same seeded episodes for each, on several processes."""
 
 from __future__ import annotations
 
@@ -43,32 +43,32 @@ def evaluate(
     """Run every controller through the same seeded episodes.
 
     Args:
-        controllers: registered names, or policies with Stable-Baselines3's `predict` (listed under their `name`, else
-            their class); as a mapping, under its keys.
-        env_id: any registered environment of this project. Scenarios bring their own; with one, it must be theirs.
-        scenario: one or several names of `artde_gym.scenarios`; None for the environment as it is.
-        episodes: of each controller in each scenario.
-        seed: of the whole evaluation; episode i has the same seed for every controller and scenario.
-        workers: processes; the results do not depend on it.
-        out: folder to store them in; the same call continues an interrupted one. Nothing is stored without it.
-        disturbances: in place of the scenario's or the environment's own.
-        env_kwargs: arguments of the environment, on top of the scenario's.
-        gains: controller name -> gains in place of its preset's.
-        vectorized: whether episodes run in vector environments, `CHUNK` of them at once, which takes an environment
-            with a vector form of its own. Both ways draw the same disturbances from a seed.
-        record_episodes: how many episodes of each controller and scenario leave signals in the folder; None for all of
-            them, or none if `vectorized`.
-        record_hz: rate of stored signals; infinite for all of them.
-        allow_mixed: continue a folder whose episodes other software ran (versions, source code, weights of controllers,
-            code of the user's own); its provenance then says so.
-        on_progress: called about once a simulated second of each running episode or chunk, and at its end.
+        controllers: registered names, or policies with Stable-Baselines3's `predict` (labeled by their `name`, else
+            their class); a mapping provides the labels as keys.
+        env_id: any registered environment of this project; scenarios bring their own, which it must match.
+        scenario: one or several names of `artde_gym.scenarios`; None for the environment itself.
+        episodes: number per controller and scenario.
+        seed: base seed; episode i has the same seed for every controller and scenario.
+        workers: number of processes; the results do not depend on it.
+        out: results folder; repeat the call to resume. Nothing is stored without it.
+        disturbances: override those of the scenario or the environment.
+        env_kwargs: environment arguments, added to the scenario's.
+        gains: controller name -> gains that override its preset's.
+        vectorized: whether to run up to `CHUNK` episodes at once in a vector environment, if the environment has one.
+            Both ways draw the same disturbances from a seed.
+        record_episodes: number of episodes per controller and scenario whose signals are stored in the folder; None
+            for all, or for none if `vectorized`.
+        record_hz: rate of stored signals; infinite for every sample.
+        allow_mixed: resume a folder whose episodes were run by other software (versions, source code, weights of
+            controllers, user code); its provenance then records that.
+        on_progress: called about once per simulated second of each running episode or chunk, and at its end.
 
     Returns:
-        The result; `complete` is False after an interruption (Ctrl-C), with all finished episodes in it.
+        The result; after an interruption (Ctrl-C), `complete` is False and all finished episodes are in it.
 
     Raises:
-        UnknownNameError, OptionError, DisturbanceError, GainError: for a bad argument, before the first episode.
-        StoreError: if `out` holds other results, or results of other software, or is written by another process.
+        UnknownNameError, OptionError, DisturbanceError, GainError: for an invalid argument, before the first episode.
+        StoreError: if `out` holds other results or results of other software, or another process is writing to it.
     """
     plan = Plan.of(
         controllers,
@@ -90,7 +90,7 @@ def evaluate(
 
 @writes_folder
 def run_plan(plan: Plan, out: str | Path | None = None, on_progress: Callable[[Update], None] | None = None) -> Result:
-    """Run the episodes of a plan that are not in the folder yet; arguments, result and errors as for `evaluate`."""
+    """Run the episodes of a plan that are not in the folder yet; see `evaluate` for arguments, result and errors."""
     evidence = plan.try_out()
     store = None
     if out is not None:
@@ -120,7 +120,7 @@ def run_plan(plan: Plan, out: str | Path | None = None, on_progress: Callable[[U
 
 
 def _in_order(rows: list[dict[str, Any]], plan: Plan) -> list[dict[str, Any]]:
-    """Sort rows by episode, cell and controller, in whatever order they were run."""
+    """Sort rows by episode, cell and controller, whatever order they were run in."""
     pairs = itertools.product([cell.name for cell in plan.cells], plan.controllers)
     places = {pair: i for i, pair in enumerate(pairs)}
     return sorted(rows, key=lambda row: (row["episode"], places[row["scenario"], row["controller"]]))

@@ -1,4 +1,4 @@
-"""Gains in place of a preset's: checked, and given to the controllers that they are for."""
+"""Gains that override a preset's: validation, and building controllers with them."""
 
 from __future__ import annotations
 
@@ -11,34 +11,34 @@ from artde_gym.registration import ControllerSpec, make_controller, register_spe
 
 
 def checked_gains(gains: Any, named: Collection[str]) -> dict[str, dict[str, Any]]:
-    """Check gains, and return those of each controller that has any given in a dictionary of its own.
+    """Validate gains and return the given ones of each controller.
 
     Raises:
-        UnknownNameError: for gains of a controller that is not among those named.
+        UnknownNameError: for gains of a controller that is not listed.
         OptionError: if they are not a mapping of controllers to mappings of their gains.
     """
     if gains is None:
         return {}
     if not isinstance(gains, Mapping):
-        raise OptionError("gains", gains, "a mapping of controllers to mappings of their gains")
+        raise OptionError("gains", gains, "a mapping of controllers to mappings of gains")
     for name, values in gains.items():
         if name not in named:
             raise UnknownNameError("gains", name, suggest_names(name, named))
         if not (isinstance(values, Mapping) and all(isinstance(gain, str) for gain in values)):
-            raise OptionError(f"gains of {name!r}", values, "a mapping of its gains")
+            raise OptionError(f"gains of {name!r}", values, "a mapping of gains")
     return {name: dict(values) for name, values in gains.items()}
 
 
 def policy_for(item: Policy | ControllerSpec, env: Any, gains: dict[str, Any]) -> Policy:
-    """Build what drives an environment: a registered controller made for it, or the policy itself.
+    """Return the policy for an environment: a registered controller built for it, or the policy itself.
 
     Raises:
         OptionError: for gains of a policy.
-        GainError: for a bad gain.
+        GainError: for an invalid gain.
     """
     if isinstance(item, ControllerSpec):
-        register_spec(item)  # a worker knows only what this project registers itself
+        register_spec(item)  # a worker otherwise knows only this project's own registrations
         return make_controller(item.name, env, **gains)
     if gains:
-        raise OptionError("gains", gains, "gains of registered names; a policy object has its own")
+        raise OptionError("gains", gains, "gains of registered names only; set them on the policy object")
     return item

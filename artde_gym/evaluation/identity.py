@@ -1,9 +1,9 @@
-"""Identities of controllers: by what a folder knows that it goes on with the policy of its episodes.
+"""Identities of controllers, by which a folder recognizes the policy of its episodes.
 
-A pickle is none: that of one model differs from process to process. In this order, the identity of a policy is what it
-declares as `identity` (text); the hash of its parameters, if it has `get_parameters` as Stable-Baselines3's models; the
-hash of its attributes, if all of them are plain values (numbers, words, arrays, functions, dataclasses, and lists and
-mappings of such); or its class alone, beside the name under which it is listed.
+A pickle does not serve: that of one model differs between processes. The identity of a policy is the first of: its
+declared `identity` (text); the hash of its parameters, if it has `get_parameters` as Stable-Baselines3's models do; the
+hash of its attributes, if all of them are plain values (numbers, strings, arrays, functions, dataclasses, and lists and
+mappings of them); or its class, together with its label.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from artde_gym.registration import ControllerSpec, resolved
 
 
 class Identity(NamedTuple):
-    """An identity, and by what it was found."""
+    """An identity and the method that determined it."""
 
     by: str
     value: str
 
 
 def identity_of(item: Any) -> Identity:
-    """The identity of a registered controller or a policy.
+    """Return the identity of a registered controller or a policy.
 
     Raises:
-        OptionError: if it declares an `identity` that is no text.
+        OptionError: if its declared `identity` is not text.
     """
     if isinstance(item, ControllerSpec):
         kwargs = json.dumps(dict(item.kwargs), sort_keys=True, default=_registered)
@@ -43,7 +43,7 @@ def identity_of(item: Any) -> Identity:
 
 
 def content_of(policy: Any) -> Identity | None:
-    """The identity that a policy has by what it has learned: a declared one, or its parameters; None without."""
+    """Return a policy's identity by its declaration or its learned parameters; None without either."""
     declared = getattr(policy, "identity", None)
     if declared is not None:
         if not isinstance(declared, str):
@@ -51,7 +51,7 @@ def content_of(policy: Any) -> Identity | None:
         return Identity("identity", f"{_class(policy)} {declared}")
     if callable(getattr(policy, "get_parameters", None)):
         parameters = policy.get_parameters()
-        if isinstance(parameters, Mapping):  # how its training would go on is no part of what a policy does
+        if isinstance(parameters, Mapping):  # training state does not affect what a policy does
             parameters = {name: value for name, value in parameters.items() if not str(name).endswith("optimizer")}
         try:
             return Identity("parameters", f"{_class(policy)} {digest(parameters)}")
@@ -61,13 +61,13 @@ def content_of(policy: Any) -> Identity | None:
 
 
 def behind(name: str, env_id: str, item: Any, policy: Any) -> dict[str, str]:
-    """Hashes of what a controller's name does not tell: what it has learned, and its code if that is the user's.
+    """Return hashes of a controller's learned weights, and of its code if that is the user's.
 
     Args:
-        name: under which it is listed.
-        env_id: of the environment that it drives.
-        item: a registered controller, or the policy itself, whose weights are its identity already.
-        policy: built for the environment.
+        name: label of the controller.
+        env_id: the environment that it drives.
+        item: a registered controller, or the policy itself, whose weights are already its identity.
+        policy: the policy built for the environment.
     """
     found: dict[str, str] = {}
     learned = content_of(policy) if isinstance(item, ControllerSpec) else None
@@ -84,21 +84,21 @@ def behind(name: str, env_id: str, item: Any, policy: Any) -> dict[str, str]:
 
 
 def digest(value: Any) -> str:
-    """Hash of a value made of numbers, words, arrays, functions, dataclasses, and lists and mappings of such.
+    """Return the hash of a value of numbers, strings, arrays, functions, dataclasses, and lists and mappings of them.
 
     Raises:
-        TypeError: if it holds anything else.
+        TypeError: if it contains anything else.
     """
     try:
         return hashlib.sha256(json.dumps(_plain(value)).encode()).hexdigest()
     except RecursionError as error:
-        raise TypeError("a value that holds itself") from error
+        raise TypeError("a value that contains itself") from error
 
 
 def _of_attributes(policy: Any) -> Identity:
     try:
         return Identity("attributes", f"{_class(policy)} {digest(vars(policy))}")
-    except TypeError:  # also of an object without any
+    except TypeError:  # also for an object without attributes
         return Identity("class and name", _class(policy))
 
 
@@ -107,7 +107,7 @@ def _class(policy: Any) -> str:
 
 
 def _registered(value: Any) -> Any:
-    """A fixed argument that JSON cannot write."""
+    """Return a stable form of a fixed argument that JSON cannot store."""
     try:
         return digest(value)
     except TypeError:
@@ -127,7 +127,7 @@ def _plain(value: Any) -> Any:
         return repr(value)
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return [_class(value), {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}]
-    tensor = getattr(value, "detach", None)  # of torch, which need not be installed
+    tensor = getattr(value, "detach", None)  # of torch, which may not be installed
     if callable(tensor):
         value = np.asarray(tensor())
     if isinstance(value, np.ndarray) and value.dtype != object:
@@ -136,7 +136,7 @@ def _plain(value: Any) -> Any:
 
 
 def _named(value: Any) -> str:
-    """A function or class of a module by its name, anything else by what it has learned."""
+    """Return the name of a function or class in a module; for anything else, the identity of what it has learned."""
     name = getattr(value, "__qualname__", "<")
     if "<" not in name:
         return f"{value.__module__}.{name}"

@@ -1,4 +1,4 @@
-"""Labels: the names under which controllers are listed, and what they stand for."""
+"""Labels of controllers, and the registered controllers and policies that they stand for."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _LIST = "a list of names or policies, at least one"
 
 
 def labeled(controllers: Any) -> dict[str, str | Policy]:
-    """Give each controller the name under which it is listed.
+    """Return the controllers by label.
 
     Raises:
-        OptionError: for no controller, a name that is no word, or one that comes twice.
+        OptionError: if there is no controller, a label is not text, or a label is given twice.
     """
     if isinstance(controllers, str) or not isinstance(controllers, Iterable):
         raise OptionError("controllers", controllers, _LIST)
@@ -32,17 +32,17 @@ def labeled(controllers: Any) -> dict[str, str | Policy]:
         raise OptionError("controllers", controllers, _LIST)
     for label, _ in pairs:
         if not isinstance(label, str):
-            raise OptionError("name of a controller", label, "a word")
+            raise OptionError("name of a controller", label, "text")
     if again := canonical.twice(label for label, _ in pairs):
-        raise OptionError("controllers", again, "each name once; give a mapping to tell two of one name apart")
+        raise OptionError("controllers", again, "each name once; pass a mapping to label each one")
     return dict(pairs)
 
 
 def named_controllers(controllers: Any) -> dict[str, Policy | ControllerSpec]:
-    """Find controllers by the name under which they are listed, names replaced by what they stand for.
+    """Return the controllers by label, names replaced by the registered controllers.
 
     Raises:
-        UnknownNameError, OptionError: for an unknown name, or what is no controller.
+        UnknownNameError, OptionError: for an unknown name, or an object that is not a controller.
     """
     known = registered_controllers()
     named: dict[str, Policy | ControllerSpec] = {}

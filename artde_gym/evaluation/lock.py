@@ -1,7 +1,7 @@
-"""One writer for each folder: a lock that the system releases when its process dies, and that says who holds it.
+"""One writer per folder: a lock that names its holder and that the system releases when the process dies.
 
-The lock is held on the file `.lock`, which is there as long as a process writes, and `.lock.json` says which one; files
-that a killed process has left behind lock nothing. A function that writes a folder is decorated by `writes_folder`.
+The lock is held on the file `.lock`, which exists while a process writes; `.lock.json` names that process. Files left
+behind by a killed process lock nothing. Decorate a function that writes a folder with `writes_folder`.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")
 
 _held: set[tuple[int, Path]] = set()
-"""Folders that threads of this process hold: a function that holds one may call another one that writes it."""
+"""Folders held by threads of this process: a function that holds one may call another that writes to it."""
 
 
 def writes_folder(function: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Result]:
-    """Let a function hold the folder that its argument `out` names for as long as it runs; None is no folder."""
+    """Lock the folder given as the argument `out` while the function runs; None is no folder."""
     signature = inspect.signature(function)
 
     @functools.wraps(function)
@@ -50,10 +50,10 @@ def writes_folder(function: Callable[_Arguments, _Result]) -> Callable[_Argument
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Hold a folder; it is made for that, and goes again if it stays empty.
+    """Hold a folder, which is created if missing and removed again if it stays empty.
 
     Raises:
-        StoreError: if another process or thread holds it, or it cannot be written.
+        StoreError: if another process or thread holds it, or it is not writable.
     """
     key = threading.get_ident(), folder.resolve()
     if key in _held:
@@ -65,9 +65,9 @@ def locked(folder: Path) -> Iterator[None]:
         yield
     finally:
         _held.discard(key)
-        with contextlib.suppress(OSError):  # somebody has removed the folder
+        with contextlib.suppress(OSError):  # the folder was removed meanwhile
             (folder / HOLDER).unlink(missing_ok=True)
-            if sys.platform != "win32":  # before the release: whoever waits for it then begins with a new file
+            if sys.platform != "win32":  # before the release, so that a waiting process begins with a new file
                 (folder / LOCK).unlink()
                 for empty in reversed(made):
                     empty.rmdir()
@@ -75,39 +75,39 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def is_empty(folder: Path) -> bool:
-    """Return whether a folder holds nothing but its lock."""
+    """Return whether a folder contains nothing but its lock."""
     return all(path.name in (LOCK, HOLDER) for path in folder.iterdir())
 
 
 def _acquire(folder: Path) -> tuple[list[Path], FileLock]:
-    """Return the folders that were made for it, and the lock that is held."""
+    """Return the created folders and the held lock."""
     try:
         made = _make(folder)
         lock = FileLock(folder / LOCK, blocking=False, thread_local=False, is_singleton=False)
         lock.acquire()
         _sign(folder)
     except Timeout:
-        allowed = f"a folder that nobody else writes; {_holder(folder)} does"
+        allowed = f"a folder without another writer; in use by {_holder(folder)}"
         raise StoreError("output folder", str(folder), allowed) from None
     except (FileExistsError, NotADirectoryError):
-        raise StoreError("output folder", str(folder), "a new or empty folder; this one holds something else") from None
+        raise StoreError("output folder", str(folder), "a new or empty folder; this one contains other files") from None
     except OSError as error:
-        raise StoreError("output folder", str(folder), f"a folder that can be written ({error})") from error
+        raise StoreError("output folder", str(folder), f"a writable folder ({error})") from error
     return made, lock
 
 
 def _make(folder: Path) -> list[Path]:
-    """Make a folder and all above it; return those that were not there yet, the uppermost first."""
+    """Create a folder and its parents; return the created ones, topmost first."""
     missing = [path for path in reversed([folder, *folder.parents]) if not path.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     return missing
 
 
 def _sign(folder: Path) -> None:
-    """Say beside the lock who holds it."""
+    """Write the lock's holder beside it."""
     now = datetime.datetime.now().astimezone().isoformat(sep=" ", timespec="seconds")
     holder = {"pid": os.getpid(), "host": platform.node(), "since": now, "command": command()}
-    with contextlib.suppress(OSError):  # a full disk shows where results are written
+    with contextlib.suppress(OSError):  # a full disk is reported when results are written
         (folder / HOLDER).write_text(json.dumps(holder))
 
 

@@ -1,26 +1,26 @@
-"""Numbers of episodes, from their signals as time goes on: no more than a block of samples has to be in memory.
+"""Metrics of episodes, computed block by block, so that only one block of samples has to be in memory.
 
-Columns by what `MetricsSpec` declares; u is the unit of a tracked error, and the first one tracked is the main one.
+`MetricsSpec` determines the columns; u is the unit of a tracked error, and the first tracked error is the main one.
 
 Per axis: `rmse_u_<axis>`, `max_abs_error_u_<axis>`, and for each effort `rms_<effort>_<unit>_<axis>`; the same with
 `_phase1_<axis>`, ... for each phase, NaN for a part that the episode did not reach. Per episode:
 
 - `rmse_u`: root of the mean square of the main error's size, over time.
-- `iae_u_s`, `itae_u_s2`: integral of the main error, and of time times it. The error is the norm, or the mean absolute
-  value, as its size is the norm or the root mean square.
-- `<effort>_variation_<unit>_s`: mean over its components of sum |f_k - f_k-1|, a second.
+- `iae_u_s`, `itae_u_s2`: integral of the main error, and of time times it. This error is the norm if its size is the
+  norm, and the mean absolute value if its size is the root mean square.
+- `<effort>_variation_<unit>_s`: mean over its components of sum |f_k - f_k-1|, per second.
 - `saturation`: share of samples with an actuator at its limit.
-- `energy_j`: integral of the power; `cost_of_transport`: energy / (g integral of the mass over the distance), the mass
-  being that of the robot with what it carries at the time; NaN below 0.1 m.
-- `tde_error_rms`, ...: root mean square of the error of time-delay estimation (rad/s^2, m/s^2).
+- `energy_j`: integral of the power; `cost_of_transport`: energy / (g integral of the mass over the distance), with the
+  mass of the robot and what it carries at the time; NaN below 0.1 m.
+- `tde_error_rms`, ...: root mean square of the time-delay estimation error (rad/s^2, m/s^2).
 - `robust_gain_mean`, ...: mean of the law's robust gain c.
 - `peak_error_u_<event>`: largest size of the main error from the beginning of a push, or the payload's drop, until 2 s
   after its end.
-- `recovery_time_s_<event>`: time from the end of each push, or the drop, until the size of the main error stays for 1 s
-  in its band, or below its largest value in the 2 s before if that is more; infinite if it never does, as in a fall
-  after the event's beginning. NaN where the episode ended too early to tell: before the event, less than 1 s after it,
-  or with an error that had stayed there for less than 1 s.
-- those of `artde_gym.evaluation.registered`, by name.
+- `recovery_time_s_<event>`: time from the end of each push, or the drop, until the size of the main error stays in its
+  band, or below its largest value in the 2 s before if that is more, for 1 s; infinite if it never does, including a
+  fall after the event's beginning. NaN if the episode ended too early to decide: before the event, less than 1 s
+  after it, or when the error had stayed there for less than 1 s.
+- The metrics of `artde_gym.evaluation.registered`, by name.
 """
 
 from __future__ import annotations
@@ -39,18 +39,18 @@ from artde_gym.layout import Layout
 from artde_gym.metrics_spec import Fields, MetricsSpec, TrackedSignal
 
 GRAVITY = 9.81  # m/s^2
-BEFORE = 2.0  # s before a disturbance, whose largest error counts as recovered too
-AFTER = 2.0  # s after it, in which its peak is looked for
-HOLD = 1.0  # s, for which a recovered error must stay in its band
-NEAR = 0.1  # m, below which a distance has no cost of transport
-END = 2**62  # a sample that no episode reaches
+BEFORE = 2.0  # s before a disturbance; the largest error in it counts as recovered too
+AFTER = 2.0  # s after a disturbance in which its peak is searched
+HOLD = 1.0  # s for which a recovered error must stay in its band
+NEAR = 0.1  # m; shorter distances have no cost of transport
+END = 2**62  # sample index that no episode reaches
 
 Span = tuple[float, float]
 Mask = NDArray[np.bool_]
 
 
 def events_of(disturbances: Mapping[str, Any]) -> dict[str, Span]:
-    """Name -> (begin, end) (s) of each push, and of the payload's drop if there is one."""
+    """Return name -> (begin, end) (s) of each push, and of the payload's drop if there is one."""
     events = {
         f"push{i}": (push["start"], push["start"] + push["duration"])
         for i, push in enumerate(disturbances.get("push", ()))
@@ -62,7 +62,7 @@ def events_of(disturbances: Mapping[str, Any]) -> dict[str, Span]:
 
 
 def payload_of(disturbances: Mapping[str, Any]) -> tuple[float, Span]:
-    """Mass (kg) of the payload, and (begin, end) (s) of when it is there, if it ever is."""
+    """Return the payload's mass (kg), and (begin, end) (s) of its presence."""
     payload = disturbances.get("payload", {"mass": 0.0, "attach_time": 0.0, "detach_time": 0.0})
     return payload["mass"], (payload["attach_time"], max(payload["attach_time"], payload["detach_time"]))
 
@@ -71,13 +71,13 @@ class Metrics:
     """Metrics of n episodes that run side by side.
 
     Args:
-        tracking: of the environment.
-        layout: of its observations.
-        period: of control (s).
-        masses: of the robot alone (kg), one an episode.
-        payloads: mass (kg), and (begin, end) (s) of when it is there, one an episode; none at all if empty.
-        events: see `events_of`, one mapping an episode.
-        phases: (begin, end) (s) of parts that are measured one by one too.
+        tracking: metrics spec of the environment.
+        layout: layout of its observations.
+        period: control period (s).
+        masses: mass of the robot alone (kg), one per episode.
+        payloads: mass (kg), and (begin, end) (s) of its presence, one per episode; empty for no payloads.
+        events: see `events_of`, one mapping per episode.
+        phases: (begin, end) (s) of parts that are also measured separately.
     """
 
     def __init__(
@@ -118,14 +118,14 @@ class Metrics:
         self._count = np.zeros(n, dtype=np.int64)  # samples of each episode so far
 
     def add(self, start: int, fields: Fields, diagnostics: Fields | None, live: Mask | None = None) -> None:
-        """Take in a block of samples; those of an episode come once each, in order.
+        """Add a block of samples; the samples of an episode come once each, in order.
 
         Args:
-            start: which sample the first one is; the first of an episode is 0.
+            start: index of the first sample; an episode's first sample is 0.
             fields: observations by name, (samples, n, size).
-            diagnostics: of the policy at these samples, (samples, n, ...), or at some of them if no error is taken from
-                there; None where the policy had nothing to decide any more.
-            live: (n,), the episodes whose samples these are; None for all.
+            diagnostics: of the policy at these samples, (samples, n, ...), or at some of them if no error depends on
+                them; None after the last decision of the policy.
+            live: (n,), the episodes that these samples belong to; None for all.
         """
         tracking = self._tracking
         live = None if live is None or live.all() else live
@@ -144,7 +144,7 @@ class Metrics:
             for prefix, (first, stop) in self._windows.items():
                 self._efforts[prefix][number].add(force[_part(max(first, 1), stop, start)], live)
             self._variations[number].add(force[_part(1, END, start)], live)
-        acted = _part(1, END, start)  # what the first observation tells of acted before this episode
+        acted = _part(1, END, start)  # the first observation reports what acted before this episode
         low, high = self._limits
         values = fields[tracking.saturated_field][acted]
         self._saturated = _added(self._saturated, np.any((values <= low) | (values >= high), axis=-1), live)
@@ -163,7 +163,7 @@ class Metrics:
             registered.add(fields, diagnostics or {}, live)
 
     def _mass(self, start: int, samples: int) -> Array:
-        """Mass of the robot with what it carries (kg), (samples, n)."""
+        """Return the mass of the robot with what it carries (kg), (samples, n)."""
         k = np.arange(start, start + samples)[:, None]
         attached, dropped = self._carried
         return self._masses + self._loads * ((attached <= k) & (k < dropped))
@@ -179,7 +179,7 @@ class Metrics:
             event.add(size, start, live)
 
     def rows(self, fell: Mask | None = None) -> list[dict[str, Any]]:
-        """The columns at the top, one row an episode; `fell` (n,) says which of them ended in a fall, None for none."""
+        """Return the metrics, one row per episode; `fell` (n,) marks episodes that ended in a fall, None for none."""
         fell = np.zeros(len(self._count), np.bool_) if fell is None else fell
         tracking, period = self._tracking, self._period
         main = tracking.errors[0]
@@ -211,7 +211,7 @@ class Metrics:
         columns |= {column: mean.value for column, mean in self._means.items()}
         for registered in self._registered:
             if registered.name in columns:
-                raise OptionError("name of a metric", registered.name, "a name that no other column has")
+                raise OptionError("name of a metric", registered.name, "a name without another column")
             columns[registered.name] = registered.value
         return [
             dict(zip(columns, row, strict=True))
@@ -228,7 +228,7 @@ class _Squares:
         self._number = np.zeros(n, dtype=np.int64)
 
     def add(self, values: Array, live: Mask | None) -> None:
-        """Take in (samples, n, size)."""
+        """Add values (samples, n, size)."""
         squares = np.square(values)
         self._sums = _added(self._sums, squares, live)
         self._largest = np.fmax(self._largest, _largest(squares, live))
@@ -236,17 +236,17 @@ class _Squares:
 
     @property
     def rms(self) -> Array:
-        """(n, size), each component's root mean square."""
+        """Root mean square of each component, (n, size)."""
         return np.sqrt(self._sums / _or_nan(self._number)[:, None])
 
     @property
     def rms_of_all(self) -> Array:
-        """(n,), the root mean square of all components together."""
+        """Root mean square of all components together, (n,)."""
         return np.sqrt(self._sums.mean(axis=-1) / _or_nan(self._number))
 
     @property
     def peak(self) -> Array:
-        """(n, size), each component's largest absolute value."""
+        """Largest absolute value of each component, (n, size)."""
         return np.sqrt(self._largest)
 
 
@@ -257,7 +257,7 @@ class _Mean:
         self._sums, self._number = np.zeros(n), np.zeros(n, dtype=np.int64)
 
     def add(self, values: Array, live: Mask | None) -> None:
-        """Take in (samples, n)."""
+        """Add values (samples, n)."""
         self._sums = _added(self._sums, values, live)
         self._number += len(values) if live is None else len(values) * live
 
@@ -267,7 +267,7 @@ class _Mean:
 
 
 class _Registered:
-    """A registered metric in n episodes."""
+    """A registered metric of n episodes."""
 
     def __init__(self, metric: Metric, n: int) -> None:
         self.name, self._signal = metric.name, metric.signal
@@ -276,10 +276,10 @@ class _Registered:
         self._mean, self._largest = _Mean(n), np.full(n, np.nan)
 
     def add(self, fields: Fields, diagnostics: Fields, live: Mask | None) -> None:
-        """Take in a block of samples.
+        """Add a block of samples.
 
         Raises:
-            OptionError: if the signal is none of n episodes.
+            OptionError: if the signal has the wrong shape.
         """
         given = self._signal(fields, diagnostics)
         if given is None:
@@ -294,21 +294,21 @@ class _Registered:
 
     @property
     def value(self) -> Array:
-        """(n,), NaN where there was no sample."""
+        """Value per episode, (n,); NaN without a sample."""
         if self._extreme:
             return self._sign * self._largest
         return np.sqrt(self._mean.value) if self._rms else self._mean.value
 
 
 class _Variation:
-    """Total variation of vectors in n episodes, mean over their components."""
+    """Total variation of vectors in n episodes, averaged over their components."""
 
     def __init__(self, n: int) -> None:
         self.total = np.zeros(n)
         self._last: Array | None = None
 
     def add(self, values: Array, live: Mask | None) -> None:
-        """Take in (samples, n, size)."""
+        """Add values (samples, n, size)."""
         if len(values):
             joined = values if self._last is None else np.concatenate([self._last, values])
             self.total = _added(self.total, np.abs(np.diff(joined, axis=0)).mean(axis=-1), live)
@@ -317,19 +317,19 @@ class _Variation:
 
 
 class _Event:
-    """What follows a disturbance in n episodes: the peak, and the recovery."""
+    """Peak and recovery after a disturbance in n episodes."""
 
     def __init__(self, spans: Sequence[Span], band: float, period: float) -> None:
         self._begin, self._end = np.array([[_sample(time, period) for time in span] for span in spans]).T
         self._before, self._after, self._hold = (_sample(time, period) for time in (BEFORE, AFTER, HOLD))
         self._period = period
         self._band = np.full(len(spans), band)
-        self._outside = self._end - 1  # the last sample outside the band, from the end of the disturbance on
-        self._recovered = np.full(len(spans), -1)  # the sample from which on it held, once it has
+        self._outside = self._end - 1  # the last sample outside the band since the end of the disturbance
+        self._recovered = np.full(len(spans), -1)  # the first sample of the recovery, once it has held
         self.peak: Array = np.full(len(spans), np.nan)
 
     def add(self, size: Array, start: int, live: Mask | None) -> None:
-        """Take in sizes of errors (samples, n), of which the first is sample `start`."""
+        """Add sizes of errors (samples, n), starting at sample `start`."""
         k = np.arange(start, start + len(size))[:, None]
         if k[-1, 0] < self._begin.min() - self._before:
             return
@@ -347,7 +347,7 @@ class _Event:
         self._outside = outside[-1]
 
     def recovery_time(self, count: NDArray[np.int64], fell: Mask) -> Array:
-        """(n,) (s), for episodes of so many samples, some of which ended in a fall; NaN where it is not known."""
+        """Return the recovery time (n,) (s) for episodes of `count` samples; NaN if unknown."""
         last = count - 1
         never = np.where(fell, last >= self._begin, (self._outside == last) & (count - self._end >= self._hold))
         time = np.where(never, np.inf, np.nan)
@@ -367,19 +367,19 @@ def _sample(time: float, period: float) -> int:
 
 
 def _part(first: int, stop: int, start: int) -> slice:
-    """Samples [first, stop) of a block that begins with sample `start`."""
+    """Return the slice for samples [first, stop) of a block that starts at sample `start`."""
     return slice(max(first - start, 0), max(stop - start, 0))
 
 
 def _added(before: Array, values: Array | Mask, live: Mask | None) -> Array:
-    """A sum (n, ...) with a block's samples (samples, n, ...) added one by one: no bit depends on the blocks."""
+    """Add a block's samples (samples, n, ...) to a sum (n, ...) one by one: no bit depends on the block size."""
     start = np.broadcast_to(before, values.shape[1:])
     total = np.add.accumulate(np.concatenate([start[None], values]), axis=0)[-1]
     return total if live is None else np.where(_beside(live, total), total, start)
 
 
 def _largest(values: Array, live: Mask | None) -> Array:
-    """Largest of a block's samples (samples, n, ...); NaN in other episodes."""
+    """Return the largest of a block's samples (samples, n, ...); NaN for episodes that are not live."""
     largest = np.fmax.reduce(values, axis=0, initial=np.nan)
     return largest if live is None else np.where(_beside(live, largest), largest, np.nan)
 

@@ -1,7 +1,7 @@
-"""The plan of a study: all that decides about its episodes, checked once.
+"""The plan of a study: everything that determines its episodes, validated once.
 
-`Plan.of` takes what a user gives to `evaluate` and its kind, and refuses what is wrong with it; what a study derives
-from a plan with `dataclasses.replace` is not checked again, but for what only an environment can tell (`try_out`).
+`Plan.of` validates the arguments that `evaluate` and the studies take. A plan derived with `dataclasses.replace` is not
+validated again, except by `try_out` for what only an environment can check.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from artde_gym.evaluation.workers import check_picklable, check_workers
 from artde_gym.registration import ControllerSpec
 
 MOST_EPISODES = 1_000_000
-SLOWEST = 1e-3  # Hz, of stored signals
+SLOWEST = 1e-3  # Hz, lowest rate of stored signals
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,12 +34,12 @@ class Plan:
     """Controllers on the same seeded episodes of some cells.
 
     Attributes:
-        controllers: by the name under which each is listed.
+        controllers: by label.
         cells: environments with their arguments and disturbances.
-        gains: controller -> gains in place of its preset's.
-        episodes: of each controller in each cell.
-        seed: from which those of the episodes are derived.
-        workers: processes.
+        gains: controller -> gains that override its preset's.
+        episodes: number per controller and cell.
+        seed: base seed, from which those of the episodes are derived.
+        workers: number of processes.
         vectorized: as for `evaluate`.
         record_episodes: how many episodes of each controller and cell leave signals; None for all, or none if
             `vectorized`.
@@ -78,10 +78,10 @@ class Plan:
         record_hz: float = 100.0,
         allow_mixed: bool = False,
     ) -> Plan:
-        """Make a plan from what `evaluate` takes; see there for the arguments.
+        """Make a plan from the arguments of `evaluate`; see there.
 
         Raises:
-            UnknownNameError, OptionError: for a bad argument.
+            UnknownNameError, OptionError: for an invalid argument.
         """
         check_workers(workers)
         check_integer("episodes", episodes, 1, MOST_EPISODES)
@@ -103,12 +103,12 @@ class Plan:
 
     @property
     def total(self) -> int:
-        """Number of all episodes."""
+        """Total number of episodes."""
         return self.episodes * len(self.cells) * len(self.controllers)
 
     @property
     def traces(self) -> int:
-        """Number of episodes of each controller and cell that leave signals."""
+        """Number of episodes per controller and cell whose signals are stored."""
         if self.record_episodes is not None:
             return self.record_episodes
         return self.episodes if not self.vectorized else 0
@@ -120,7 +120,7 @@ class Plan:
         return dataclasses.replace(self, controllers=controllers, gains=gains, cells=(cell,))
 
     def configuration(self) -> dict[str, Any]:
-        """Return what a results folder is continued by: all that decides about an episode, as plain data."""
+        """Return everything that determines an episode, as plain data; only equal ones resume a folder."""
         return {
             "cells": [{"name": cell.name, "env_id": cell.env_id, "kwargs": cell.kwargs} for cell in self.cells],
             "controllers": {name: identity.value for name, identity in self._identities.items()},
@@ -134,7 +134,7 @@ class Plan:
         }
 
     def provenance(self, evidence: Mapping[str, str]) -> dict[str, Any]:
-        """Return what produces the results, with what `try_out` found behind the controllers."""
+        """Return the provenance of the results, including the hashes from `try_out`."""
         return provenance(evidence, {name: identity.by for name, identity in self._identities.items()})
 
     @functools.cached_property
@@ -142,13 +142,13 @@ class Plan:
         return {name: identity_of(item) for name, item in self.controllers.items()}
 
     def try_out(self) -> dict[str, str]:
-        """Build everything once, so that a bad argument shows before the first episode and not in a worker.
+        """Build everything once, so that an invalid argument is reported before the first episode, not in a worker.
 
         Returns:
-            Hashes of weights and code behind the controllers.
+            Hashes of the controllers' weights and code.
 
         Raises:
-            OptionError, DisturbanceError, GainError: for what an environment or a controller refuses.
+            OptionError, DisturbanceError, GainError: if an environment or a controller rejects an argument.
         """
         found: dict[str, str] = {}
         for cell in self.cells:
@@ -158,7 +158,7 @@ class Plan:
         return found
 
     def tasks(self, done: Collection[tuple[str, str, int]]) -> Iterator[Task]:
-        """Return what is left to run: `done` are scenario, controller and number of finished episodes."""
+        """Return the remaining tasks; `done` holds scenario, controller and number of finished episodes."""
         cases = [
             Case(cell, name, item, self.gains.get(name, {}), self.seed)
             for cell, (name, item) in itertools.product(self.cells, self.controllers.items())

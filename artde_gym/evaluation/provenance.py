@@ -1,4 +1,4 @@
-"""What produced a result: versions, commit, source code, platform and command."""
+"""Provenance of a result: versions, commit, source code, platform and command."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ PACKAGES = (
 )  # fmt: skip
 
 DECISIVE = ("artde-gym", "gymnasium", "mujoco", "numpy", "pybullet", "scipy")
-"""Packages of which another version may change the last bits of a result."""
+"""Packages whose version may change the last bits of a result."""
 
 SOURCES = ("artde_gym", "baselines", "controllers")
 _SOFTWARE = ("commit", "source_sha256", "packages", "behind_controllers")
 MIXED = "mixed_with"
-"""Where a provenance keeps the other software that results in its folder were made with."""
+"""Key of a provenance for the other software that produced results in its folder."""
 
 
 def provenance(
     behind: Mapping[str, str] | None = None, identified_by: Mapping[str, str] | None = None
 ) -> dict[str, Any]:
-    """Everything that a reader needs to run the same again.
+    """Return everything needed to reproduce a run.
 
     Args:
-        behind: hashes of weights and code behind controllers, see `artde_gym.evaluation.identity.behind`.
-        identified_by: controller -> by what its identity was found.
+        behind: hashes of the controllers' weights and code, see `artde_gym.evaluation.identity.behind`.
+        identified_by: controller -> the method that determined its identity.
     """
     return {
         "time": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
@@ -55,16 +55,16 @@ def provenance(
 def continued(
     folder: Path, before: Mapping[str, Any] | None, now: dict[str, Any], *, allow_mixed: bool
 ) -> dict[str, Any]:
-    """The provenance of a folder that is continued: that of now, with all other software that its results are of.
+    """Return the provenance of a resumed folder: the current one, with all other software that produced its results.
 
     Args:
-        folder: of the results.
-        before: the provenance that it holds; None if it holds no results.
-        now: of this process.
-        allow_mixed: whether results of other software may be continued.
+        folder: the results folder.
+        before: the provenance in it; None if it has no results.
+        now: the provenance of this process.
+        allow_mixed: whether to resume results of other software.
 
     Raises:
-        StoreError: if the results are of other software and must not be mixed.
+        StoreError: if the results are of other software and `allow_mixed` is not set.
     """
     if before is None:
         return now
@@ -82,7 +82,7 @@ def continued(
 
 
 def _differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> dict[str, tuple[object, object]]:
-    """What decides about results and is not as it was -> before, now. The source counts, not the commit's name."""
+    """Return decisive differences as name -> (before, now). The source code counts, not the commit's name."""
     old, new = before["packages"], now["packages"]
     found = {f"version of {name}": (old[name], new.get(name)) for name in DECISIVE if name in old}
     if "source_sha256" in before:
@@ -95,13 +95,13 @@ def _differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> dict[str,
 
 
 def command() -> str:
-    """The command line of this process."""
+    """Return the command line of this process."""
     return " ".join([Path(sys.argv[0]).name, *sys.argv[1:]])
 
 
-@functools.cache  # what was imported stays what it was, whatever happens to the files
+@functools.cache  # an imported module stays what it was, whatever happens to its file
 def source_hash() -> str:
-    """Hash of all modules of this project, changes that are not committed included."""
+    """Return the hash of all modules of this project, uncommitted changes included."""
     found = hashlib.sha256()
     for package in SOURCES:
         spec = util.find_spec(package)
@@ -114,12 +114,12 @@ def source_hash() -> str:
 
 
 def software() -> dict[str, str]:
-    """What must be equal for results to be so: versions of the decisive packages, and the source code's hash."""
+    """Return what must match for equal results: versions of the decisive packages, and the source code's hash."""
     return {**versions(DECISIVE), "source_sha256": source_hash()}
 
 
 def versions(packages: Iterable[str]) -> dict[str, str]:
-    """Versions of those packages that are installed."""
+    """Return the versions of the installed ones of these packages."""
     return {name: version for name in packages if (version := _version(name)) is not None}
 
 
@@ -133,7 +133,7 @@ def _version(package: str) -> str | None:
 
 @functools.cache
 def _commit() -> str | None:
-    """The commit of this checkout, "-dirty" with changes on top; None for an installed package."""
+    """Return the commit of this checkout, with "-dirty" if it has changes; None for an installed package."""
     root = Path(__file__).resolve().parents[2]
     if not (root / ".git").exists():
         return None

@@ -1,4 +1,4 @@
-"""Metrics of one's own: a signal of each sample, and how an episode's samples become one number."""
+"""User-defined metrics: a signal at each sample, and its reduction to one number per episode."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ TAKEN = (
     "cell", "controller", "duration_s", "env", "episode", "fall_reason", "fall_rate", "fell", "point", "reward",
     "scenario", "seed", "time_to_fall_s",
 )  # fmt: skip
-"""Columns that say which episode it is and how it ended."""
+"""Columns that identify an episode and its ending."""
 
 Reduction = Literal["mean", "rms", "max", "min"]
 Signal = Callable[[Fields, Fields], Array | None]
 """Computes values (samples, n) of n episodes from observations by name (samples, n, size) and a policy's diagnostics.
 
-Diagnostics are there at some samples only, and none at the end: the mapping is empty then. None is no value, as for
-another robot or a policy that does not tell.
+Diagnostics exist at some samples only, and not at the end: the mapping is then empty. Return None for no value, e.g.
+for another robot or a policy without these diagnostics.
 """
 
 
@@ -33,12 +33,12 @@ class Metric:
     """A column of the table of episodes.
 
     Attributes:
-        name: of the column, in small letters, digits and underscores, with the unit at its end.
-        signal: computes a value of each sample, elementwise.
-        reduction: what an episode's samples become: their mean, root mean square, largest or smallest value.
+        name: of the column, in lowercase letters, digits and underscores, ending with the unit.
+        signal: computes a value at each sample, elementwise.
+        reduction: from an episode's samples to their mean, root mean square, largest or smallest value.
 
     Raises:
-        OptionError: for a name that is no column, or an unknown reduction.
+        OptionError: for an invalid name, or an unknown reduction.
     """
 
     name: str
@@ -47,37 +47,37 @@ class Metric:
 
     def __post_init__(self) -> None:
         if not (isinstance(self.name, str) and re.fullmatch("[a-z][a-z0-9_]*", self.name)):
-            raise OptionError("name of a metric", self.name, "small letters, digits and underscores")
+            raise OptionError("name of a metric", self.name, "lowercase letters, digits and underscores")
         if self.name in TAKEN:
             raise OptionError("name of a metric", self.name, f"a new name; these are taken: {', '.join(TAKEN)}")
         check_choice("reduction", self.reduction, get_args(Reduction))
 
 
 METRICS: Registry[Metric] = Registry("metric", "artde_gym.metrics", lambda metric: {_checked(metric).name: metric})
-"""Metrics by name, beside those of `artde_gym.evaluation.metrics`: of plug-ins, and those registered."""
+"""Metrics by name, from plug-ins and `register_metric`, in addition to those of `artde_gym.evaluation.metrics`."""
 
 
 def register_metric(name: str, signal: Signal, reduction: Reduction = "mean", *, replace: bool = False) -> None:
-    """Add a metric to every evaluation from now on: to its table of episodes, summary, comparisons and reports.
+    """Add a metric to all later evaluations: their tables of episodes, summaries, comparisons and reports.
 
-    Worker processes know metrics of entry points, and those that are registered when the script that calls `evaluate`,
-    or a module that it imports, is imported: outside of `if __name__ == "__main__":`.
+    Worker processes know the metrics of entry points, and those registered when the script that calls `evaluate`, or a
+    module imported by it, is imported: outside of `if __name__ == "__main__":`.
 
     Raises:
-        OptionError: for a name that is taken or no column, or an unknown reduction.
+        OptionError: for a name that is taken or invalid, or an unknown reduction.
     """
     METRICS.register(name, Metric(name, signal, reduction), replace=replace)
 
 
 def require_metrics(names: Iterable[str]) -> None:
-    """See that this process knows the metrics of the one that has started it.
+    """Check that this process knows the metrics of the process that started it.
 
     Raises:
-        UnknownNameError: if it does not.
+        UnknownNameError: for an unknown metric.
     """
     for name in names:
         if name not in METRICS:
-            place = "register it where the script is imported, above `if __name__ == '__main__':`, or by an entry point"
+            place = "register it at import, above `if __name__ == '__main__':`, or by an entry point"
             raise UnknownNameError("metric in a worker process", name, f"{suggest_names(name, METRICS)}; {place}")
 
 

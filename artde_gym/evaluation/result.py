@@ -1,4 +1,4 @@
-"""What an evaluation found: episodes, their summary, and paired comparisons."""
+"""The result of an evaluation: episodes, their summary, and paired comparisons."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from artde_gym.motion.replay import Replay
 
 _NOT_METRICS = ("seed", "episode", "fell", "duration_s")
 _OF_ALL = ("fell", "reward")
-"""Metrics that mean something for an episode that ended in a fall too, as times until something happens do."""
+"""Metrics that are also meaningful for an episode that ended in a fall, as are times until an event."""
 RECOVERY = "recovery_time_s_"
 RECOVERED = "recovered_"
 _TIME_TO_FALL = "time_to_fall_s"
 
 
 class Recovery(NamedTuple):
-    """How often and how soon the error was back after a disturbance.
+    """Share and time of recoveries of the error after a disturbance.
 
     Attributes:
-        share: of the episodes in which it is known, with Wilson's interval.
-        median: of the times (s), never as the largest.
+        share: recovered share of the episodes with a known outcome, with Wilson's interval.
+        median: median recovery time (s); "never" counts as the largest.
     """
 
     share: statistics.Estimate
@@ -43,12 +43,12 @@ class Result:
     """Episodes of several controllers on the same seeds.
 
     Attributes:
-        episodes: one row an episode and controller; see `artde_gym.evaluation.metrics` for the columns.
-        folder: where they are stored, if they are.
+        episodes: one row per episode and controller; see `artde_gym.evaluation.metrics` for the columns.
+        folder: the results folder, if they are stored.
         complete: False if the evaluation was interrupted.
 
     Raises:
-        OptionError: if an episode is there twice, which would count it as two.
+        OptionError: if an episode is given twice.
     """
 
     episodes: pd.DataFrame
@@ -88,42 +88,42 @@ class Result:
         return replay_folder(self.folder, scenario, controllers, episode)
 
     def _different(self, column: str) -> list[str]:
-        """Values of a column in the order in which they come; an empty result has no columns."""
+        """Return the distinct values of a column, in order of appearance; an empty result has no columns."""
         return [] if self.episodes.empty else list(dict.fromkeys(self.episodes[column].tolist()))
 
     @property
     def metrics(self) -> list[str]:
-        """Columns that a comparison makes sense for."""
+        """Columns that can be compared."""
         numbers = self.episodes.select_dtypes("number").columns
         return [name for name in numbers if name not in _NOT_METRICS and not name.startswith(DRAWN)]
 
     def rows(self, scenario: str, controller: str) -> pd.DataFrame:
-        """The episodes of one controller in one scenario, indexed by their number."""
+        """Return the episodes of one controller in one scenario, indexed by their number."""
         chosen = (self.episodes["scenario"] == scenario) & (self.episodes["controller"] == controller)
         frame: pd.DataFrame = self.episodes.loc[chosen]
         return frame.set_index("episode")
 
     def values(self, scenario: str, controller: str, metric: str) -> Array:
-        """A metric over the episodes of one controller in one scenario."""
+        """Return a metric over the episodes of one controller in one scenario."""
         return self.rows(scenario, controller)[metric].to_numpy(dtype=np.float64)
 
     def falls(self, scenario: str, controller: str) -> tuple[int, statistics.Estimate]:
-        """Number of falls, and their rate with Wilson's interval."""
+        """Return the number of falls, and their rate with Wilson's interval."""
         fell = self.rows(scenario, controller)["fell"].to_numpy(dtype=np.bool_)
         return int(fell.sum()), statistics.rate(int(fell.sum()), len(fell))
 
     def recovery(self, scenario: str, controller: str, event: str) -> Recovery:
-        """Judge the recovery of one controller after an event, e.g. "push0", in one scenario."""
+        """Return the recovery of one controller after an event, e.g. "push0", in one scenario."""
         times = self.values(scenario, controller, RECOVERY + event)
         known = times[~np.isnan(times)]
         return Recovery(statistics.rate(int(np.isfinite(known).sum()), len(known)), statistics.median(known))
 
     def summary(self) -> pd.DataFrame:
-        """Mean, 95 % interval, median and number of episodes, indexed by scenario, controller and metric.
+        """Return mean, 95 % interval, median and number of episodes, indexed by scenario, controller and metric.
 
         `fall_rate` and the share `recovered_<event>` have Wilson's interval, other means a bootstrap one. Times until
-        something happens (`recovery_time_s_<event>`, `time_to_fall_s`) have no mean: never counts as the largest of
-        them, and the interval is the median's. Metrics of tracking cover fallen episodes up to the fall.
+        an event (`recovery_time_s_<event>`, `time_to_fall_s`) have no mean: "never" counts as the largest time, and the
+        interval is the median's. Tracking metrics cover fallen episodes up to the fall.
         """
         lines = []
         for scenario in self.scenarios:
@@ -137,17 +137,17 @@ class Result:
         return WideTable(lines, columns=columns).set_index(columns[:3])
 
     def pairs(self, scenario: str, first: str, second: str, metric: str) -> tuple[Array, Array]:
-        """The metric's values of two controllers on the same seeds; see `compare` for which seeds."""
+        """Return a metric's values of two controllers on the same seeds; see `compare` for the selection of seeds."""
         return _comparable(*paired(self.rows(scenario, first), self.rows(scenario, second)), metric)
 
     def compare(self, first: str, second: str) -> pd.DataFrame:
-        """Paired differences first - second, indexed by scenario and metric.
+        """Compute paired differences first - second, indexed by scenario and metric.
 
-        A pair is two episodes of the same seed in which the same was drawn. Columns: means of both, their `difference`
-        with its 95 % bootstrap interval `low`, `high`, `percent` (difference of the means relative to second),
-        `win_probability` (share of pairs in which first is smaller) and `pairs`. Metrics of tracking use the pairs in
-        which nobody fell: an error up to a fall is no error of a walk. Times until something happens
-        (`recovery_time_s_<event>`, `time_to_fall_s`) count as the largest where it never does: both columns hold
+        A pair is two episodes with the same seed and the same sampled disturbances. Columns: means of both, their
+        `difference` with its 95 % bootstrap interval `low`, `high`, `percent` (difference of the means relative to
+        second), `win_probability` (share of pairs in which first is smaller) and `pairs`. Tracking metrics use only
+        pairs without a fall: an error up to a fall is not comparable. Times until an event
+        (`recovery_time_s_<event>`, `time_to_fall_s`) count as the largest if it never happens: both columns hold
         medians, and there is no difference; `recovered_<event>` compares the shares.
 
         Raises:
@@ -176,18 +176,18 @@ class Result:
 
 
 def _is_time(metric: str) -> bool:
-    """Tell a time until something happens, which may be never."""
+    """Return whether a metric is a time until an event, which may never happen."""
     return metric == _TIME_TO_FALL or metric.startswith(RECOVERY)
 
 
 def _values(rows: pd.DataFrame, metric: str) -> Array:
-    """A metric's values; a fall that never came is at infinity."""
+    """Return a metric's values; the time of a fall that never happened is infinite."""
     values = rows[metric].to_numpy(dtype=np.float64)
     return np.where(np.isnan(values), np.inf, values) if metric == _TIME_TO_FALL else values
 
 
 def _summarized(rows: pd.DataFrame, metric: str) -> list[tuple[str, float, float, float, float, int]]:
-    """Lines of a summary: metric, mean, interval, median, number."""
+    """Return lines of a summary: metric, mean, interval, median, number."""
     values = _values(rows, metric)
     if not _is_time(metric):
         mean = statistics.mean(values)
@@ -203,7 +203,7 @@ def _summarized(rows: pd.DataFrame, metric: str) -> list[tuple[str, float, float
 
 
 def _difference(a: Array, b: Array) -> tuple[float, ...]:
-    """Columns of a comparison of means."""
+    """Return the columns of a comparison of means."""
     difference = statistics.mean(a - b)
     mean_a, mean_b = (float(side.mean()) if len(side) else np.nan for side in (a, b))
     percent = 100 * difference.value / mean_b if mean_b else np.nan
@@ -211,7 +211,7 @@ def _difference(a: Array, b: Array) -> tuple[float, ...]:
 
 
 def _comparable(mine: pd.DataFrame, theirs: pd.DataFrame, metric: str) -> tuple[Array, Array]:
-    """The values of those pairs that can be compared."""
+    """Return the values of the pairs that can be compared."""
     a, b = (_values(rows, metric) for rows in (mine, theirs))
     if _is_time(metric):
         used = ~(np.isnan(a) | np.isnan(b))

@@ -1,4 +1,4 @@
-"""One episode: an environment, a policy and a seed in; metrics and traces out."""
+"""One episode of an environment, a policy and a seed, with metrics and traces as its result."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PROGRESS_INTERVAL = 1.0  # s of simulated time
 
 
 class Policy(Protocol):
-    """Stable-Baselines3's predictor protocol; `diagnostics(state)` is recorded where a policy has it."""
+    """Stable-Baselines3's predictor protocol; `diagnostics(state)` is recorded if a policy has it."""
 
     def predict(
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
@@ -45,15 +45,15 @@ def run_episode(
     phases: Sequence[Span] = (),
     on_progress: Callable[[float], None] | None = None,
 ) -> Episode:
-    """Drive `env` with `policy` from a seeded reset to the end.
+    """Run `policy` in `env` from a seeded reset to the end.
 
     Args:
         env: an environment of this project, wrapped or not.
-        seed: of the reset; the same seed has the same disturbances whatever the policy.
-        options: of the reset.
+        seed: of the reset; equal seeds give equal disturbances whatever the policy.
+        options: for the reset.
         record_hz: rate of the traces, at most the control rate; infinite for every sample.
         phases: see `Metrics`.
-        on_progress: called with the simulated time (s) about once a simulated second.
+        on_progress: called with the simulated time (s), about once per simulated second.
     """
     plant = env.unwrapped
     period: float = plant.control_period
@@ -90,7 +90,7 @@ def run_episode(
     metrics = metrics_for(plant, [disturbances], phases)
     last = len(observations) - 1
     metrics.add(0, _part(fields, np.s_[:last, None]), _part(inside, np.s_[:, None]))
-    metrics.add(last, _part(fields, np.s_[last:, None]), None)  # nothing was decided there any more
+    metrics.add(last, _part(fields, np.s_[last:, None]), None)  # no decision follows the last observation
     reason = fall_reason(info) if terminated else None
     row = row_of(reason, info["time_s"], total, metrics.rows(np.array([bool(terminated)]))[0], disturbances)
     kept = slice(None, None, stride // looks)
@@ -117,12 +117,12 @@ class _Poses:
 
 
 def diagnosed_every(plant: Any, stride: int) -> int:
-    """How many control periods lie between two looks at a policy's inside, for metrics and for traces of a stride."""
+    """Return the number of control periods between two diagnostics of a policy, for metrics and traces of a stride."""
     return 1 if plant.metrics_spec.diagnosed else stride
 
 
 def metrics_for(plant: Any, disturbances: Sequence[Mapping[str, Any]], phases: Sequence[Span]) -> Metrics:
-    """Metrics of episodes in an environment, from the sampled disturbances of each."""
+    """Return the metrics of episodes in an environment, given the sampled disturbances of each."""
     masses = [plant.nominal_robot.mass * one.get("mass_scale", {}).get("factor", 1.0) for one in disturbances]
     payloads = [payload_of(one) for one in disturbances]
     events = [events_of(one) for one in disturbances]
@@ -132,7 +132,7 @@ def metrics_for(plant: Any, disturbances: Sequence[Mapping[str, Any]], phases: S
 def row_of(
     fall_reason: str | None, time_s: float, reward: float, metrics: dict[str, Any], disturbances: dict[str, Any]
 ) -> dict[str, Any]:
-    """One episode's row; `fall_reason` is None without a fall."""
+    """Return one episode's row; `fall_reason` is None without a fall."""
     fell = fall_reason is not None
     return {
         "fell": fell,
@@ -146,7 +146,7 @@ def row_of(
 
 
 def traces_of(period: float, fields: dict[str, Array], inside: dict[str, Array]) -> dict[str, Array]:
-    """Signals of one episode, sampled every `period` (s): observations (and more) and the policy's diagnostics."""
+    """Return the signals of one episode every `period` (s): observations (and more) and the policy's diagnostics."""
     return {
         "time": period * np.arange(len(next(iter(fields.values())))),
         **{name: values.astype(np.float32) for name, values in fields.items()},
@@ -155,7 +155,7 @@ def traces_of(period: float, fields: dict[str, Array], inside: dict[str, Array])
 
 
 def stack(samples: list[dict[str, Array]]) -> dict[str, Array]:
-    """Samples of named arrays as named arrays of samples."""
+    """Stack samples of named arrays into named arrays of samples."""
     return {name: np.array([sample[name] for sample in samples]) for name in samples[0]} if samples else {}
 
 
@@ -173,7 +173,7 @@ def _part(signals: dict[str, Array], part: Any) -> dict[str, Array]:
 
 
 def _flatten(disturbances: dict[str, Any]) -> dict[str, Any]:
-    """Sampled values as columns: payload.mass, push.0.magnitude, ..."""
+    """Flatten sampled values into columns: payload.mass, push.0.magnitude, ..."""
     columns: dict[str, Any] = {}
 
     def visit(path: str, value: Any) -> None:

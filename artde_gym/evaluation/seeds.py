@@ -1,4 +1,4 @@
-"""Seeds of episodes: 64 bits each, and the type of the columns that hold them."""
+"""Episode seeds: 64 bits each, and the dtype of their columns."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import numpy as np
 import pandas as pd
 
 SEED = np.uint64
-"""Type of a column of seeds: one type whatever the values, so that tables can be joined without rounding them."""
+"""Dtype of a column of seeds: the same for all values, so that joining tables does not round them."""
 
 
 def episode_seed(seed: int, episode: int) -> int:
-    """Derive the seed of one episode: independent streams for all pairs of numbers."""
+    """Derive the seed of one episode; all pairs of numbers give independent streams."""
     return int(np.random.SeedSequence([seed, episode]).generate_state(1, SEED)[0])
 
 
 def with_exact_seeds(episodes: pd.DataFrame) -> pd.DataFrame:
-    """Give the column `seed` of a table of episodes its type; pandas takes the narrowest that its values fit."""
+    """Return a table of episodes with its column `seed` as `SEED`; pandas infers the narrowest type."""
     return episodes.astype({"seed": SEED}) if "seed" in episodes else episodes

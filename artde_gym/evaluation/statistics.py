@@ -1,4 +1,4 @@
-"""Intervals for few, paired, seeded episodes."""
+"""Confidence intervals for few, paired, seeded episodes."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ class Estimate(NamedTuple):
 
 
 def mean(values: ArrayLike) -> Estimate:
-    """Mean with its bootstrap interval (percentile); not finite values are left out.
+    """Compute the mean with its bootstrap interval (percentile); values that are not finite are left out.
 
-    With a single value, or only equal ones, the data say nothing of their spread: the interval is NaN for one value,
-    the value itself for equal ones. Beyond `MANY` values the interval is that of the central limit, which the
-    bootstrap's agrees with there.
+    One value, or only equal ones, say nothing about the spread: the interval is NaN for one value, the value itself
+    for equal ones. Beyond `MANY` values the interval is that of the central limit theorem, which agrees with the
+    bootstrap's there.
     """
     finite = _finite(values)
     center = float(finite.mean()) if len(finite) else np.nan
@@ -40,9 +40,9 @@ def mean(values: ArrayLike) -> Estimate:
 
 
 def median(values: ArrayLike) -> Estimate:
-    """Median with the exact interval of order statistics; infinite values count as the largest, NaN is left out.
+    """Compute the median with the exact interval of order statistics; infinite values are the largest, NaN is left out.
 
-    Fewer than six values say too little of it: the interval is NaN.
+    Fewer than six values are too few: the interval is NaN.
     """
     array = np.asarray(values, dtype=np.float64)
     known = np.sort(array[~np.isnan(array)])
@@ -55,14 +55,14 @@ def median(values: ArrayLike) -> Estimate:
 
 
 def improvement(ours: ArrayLike, theirs: ArrayLike) -> Estimate:
-    """By how many percent the mean of ours is below that of theirs, for paired values; intervals as of `mean`."""
+    """Compute the percentage by which the mean of `ours` is below that of `theirs`, for paired values."""
     pairs = np.array([ours, theirs], dtype=np.float64).reshape(2, -1)
     a, b = pairs[:, np.isfinite(pairs).all(axis=0)]
     ratio = float(a.mean() / b.mean()) if len(a) else np.nan
     value = 100.0 * (1.0 - ratio)
     if len(a) <= MANY:
         return _bootstrap((a, b), value, lambda x, y, axis: 100.0 * (1.0 - x.mean(axis=axis) / y.mean(axis=axis)))
-    return _central_limit(100.0 * (ratio * b - a) / b.mean(), value)  # a ratio's error, to first order
+    return _central_limit(100.0 * (ratio * b - a) / b.mean(), value)  # error of the ratio, to first order
 
 
 def change(ours: ArrayLike, theirs: ArrayLike) -> Estimate:
@@ -100,13 +100,13 @@ def _bootstrap(
 
 
 def _central_limit(deviations: Array, value: float) -> Estimate:
-    """Of an estimate whose error is the mean error of its values."""
+    """Return an estimate whose error is the mean error of its values."""
     half = stats.norm.ppf(0.5 + CONFIDENCE / 2) * float(deviations.std()) / np.sqrt(len(deviations))
     return Estimate(value, value - half, value + half, len(deviations))
 
 
 def rate(successes: int, trials: int) -> Estimate:
-    """A rate with Wilson's score interval."""
+    """Compute a rate with Wilson's score interval."""
     if trials == 0:
         return Estimate(np.nan, np.nan, np.nan, 0)
     interval = stats.binomtest(successes, trials).proportion_ci(CONFIDENCE, method="wilson")
@@ -114,7 +114,7 @@ def rate(successes: int, trials: int) -> Estimate:
 
 
 def win_probability(first: ArrayLike, second: ArrayLike) -> float:
-    """Share of pairs in which `first` is smaller, ties counting one half; infinite values are the largest."""
+    """Compute the share of pairs in which `first` is smaller; ties count one half, infinite values are the largest."""
     a, b = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
     return float(np.mean((a < b) + 0.5 * (a == b))) if a.size else float("nan")
 

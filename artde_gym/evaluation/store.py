@@ -1,11 +1,11 @@
-"""A results folder: finished episodes one by one, then the summary.
+"""Crash-safe results folder: finished episodes one by one, then the summary.
 
-    episodes.csv     one row an episode and controller, appended as each one finishes
+    episodes.csv     one row per episode and controller, appended as each one finishes
     summary.csv      mean and 95 % interval of every metric
     summary.json     configuration and provenance, written before the first episode
-    traces/          <scenario>/<controller>-<episode>.npz, signals at the trace's rate
+    traces/          <scenario>/<controller>-<episode>.npz, signals at the traces' rate
 
-A folder belongs to one configuration and one software: the same ones continue it, any others are refused.
+A folder belongs to one configuration and one software: only the same ones can resume it.
 """
 
 from __future__ import annotations
@@ -34,21 +34,21 @@ from artde_gym.evaluation.seeds import episode_seed, with_exact_seeds
 RECORD, TABLE = "summary.json", "episodes.csv"
 KEY = ("scenario", "controller", "episode")
 _WORDS = ("scenario", "controller", "env", "fall_reason")
-_UNDAMAGED = "a table of episodes as `evaluate` wrote it; without the damaged rows, these episodes are run again"
+_UNDAMAGED = "a table of episodes as `evaluate` wrote it; delete the damaged rows to run these episodes again"
 
 
 class Store:
-    """The folder of one evaluation, held by a lock (`artde_gym.evaluation.lock`) for as long as it is written.
+    """The folder of one evaluation, locked (`artde_gym.evaluation.lock`) while it is written.
 
     Args:
-        folder: of the results.
-        configuration: what is run.
+        folder: the results folder.
+        configuration: configuration of the evaluation.
         made_by: provenance of this process.
-        allow_mixed: whether results of other software may be continued.
+        allow_mixed: whether to resume results of other software.
 
     Raises:
-        OptionError: if JSON cannot write the configuration, or a name is none for files.
-        StoreError: if the folder holds anything else than results of the same configuration and software.
+        OptionError: if JSON cannot store the configuration, or a name is not a valid file name.
+        StoreError: if the folder contains anything but results of the same configuration and software.
     """
 
     def __init__(
@@ -62,11 +62,11 @@ class Store:
         self.rows = [] if before is None else self._read_rows()
         self._columns = list(self.rows[0]) if self.rows else []
         self._provenance = continued(folder, before if self.rows else None, made_by, allow_mixed=allow_mixed)
-        if not self.rows or MIXED in self._provenance:  # what is mixed is known before it is
+        if not self.rows or MIXED in self._provenance:  # records that results are mixed before they are
             self._write_record(None)
 
     def add(self, episodes: Sequence[tuple[Mapping[str, Any], Mapping[str, NDArray[Any]]]]) -> None:
-        """Keep finished episodes, each a row and traces; rows are written last, so that a row always has its traces."""
+        """Store finished episodes, each a row and traces; rows are written last, so that each row has its traces."""
         for row, traces in episodes:
             if traces:
                 self.save_traces(row, traces)
@@ -121,7 +121,7 @@ class Store:
         return rows
 
     def _rewrite(self) -> None:
-        """The whole table, for rows with columns of their own."""
+        """Write the whole table, for rows with additional columns."""
         self._columns = list(dict.fromkeys(column for row in self.rows for column in row))
         lines = [_line(self._columns)]
         lines += [_line([row.get(column, "") for column in self._columns]) for row in self.rows]
@@ -129,10 +129,10 @@ class Store:
 
 
 def read_episodes(folder: Path) -> tuple[str, pd.DataFrame]:
-    """The table of finished episodes, as text and parsed; a row cut off by a crash, or just being written, is left out.
+    """Read the finished episodes, as text and parsed; a row cut off by a crash or an ongoing write is left out.
 
     Raises:
-        StoreError: if it is damaged.
+        StoreError: if the table is damaged.
     """
     path = folder / TABLE
     with wrap_read_errors(TABLE, path, _UNDAMAGED, StoreError):
@@ -146,14 +146,14 @@ def read_episodes(folder: Path) -> tuple[str, pd.DataFrame]:
                 check_file_name(name, value)
         for name, kind in {"episode": "iu", "seed": "iu", "fell": "b", "duration_s": "fiu"}.items():
             if frame[name].dtype.kind not in kind:
-                raise ValueError(f"{name} is no column of its kind")
+                raise ValueError(f"column {name} has values of another kind")
         words = [str(name) for name in frame.select_dtypes(exclude=["number", "bool"]) if name not in _WORDS]
         if any(not name.startswith("disturbance.") and frame[name].notna().any() for name in words):
-            raise ValueError(f"words among the numbers of {', '.join(words)}")
+            raise ValueError(f"text in the numeric columns {', '.join(words)}")
         if frame.duplicated(list(KEY)).any():
-            raise ValueError("an episode twice")
+            raise ValueError("a duplicate episode")
         if (frame["seed"].to_numpy() < 0).any():
-            raise ValueError("a seed below zero")
+            raise ValueError("a negative seed")
     return whole, with_exact_seeds(frame)
 
 
@@ -189,19 +189,19 @@ def _traces_path(folder: Path, scenario: Any, controller: Any, episode: Any) -> 
 
 
 def parse_table(text: str, words: Collection[str]) -> pd.DataFrame:
-    """A CSV table; the columns named by `words` hold what is written there, all others numbers to the last bit.
+    """Parse a CSV table; the columns in `words` are kept as text, all others are numbers to the last bit.
 
-    Left to itself, pandas takes "1", "true" and "nan" for something else than words, and some releases round numbers.
+    pandas by itself would interpret "1", "true" and "nan" in text, and some of its releases round numbers.
 
     Raises:
-        ValueError: if it is no table, or has a column twice.
+        ValueError: if it is not a table, or has a duplicate column.
     """
     try:
         columns, *rows = csv.reader(io.StringIO(text), strict=True)
     except csv.Error as error:
         raise ValueError(str(error)) from error
     if len(set(columns)) != len(columns) or any(len(row) != len(columns) for row in rows):
-        raise ValueError("rows of different lengths, or a column twice")
+        raise ValueError("rows of different lengths, or a duplicate column")
     parsed = {
         name: [row[i] for row in rows] if name in words else _parsed([row[i] for row in rows])
         for i, name in enumerate(columns)
@@ -210,7 +210,7 @@ def parse_table(text: str, words: Collection[str]) -> pd.DataFrame:
 
 
 def _parsed(column: list[str]) -> list[Any]:
-    """A column of truth values, whole numbers or numbers, where nothing is NaN; of words if it is none of these."""
+    """Parse a column as booleans, integers or floats (empty is NaN); as text if it is none of these."""
     if not {*column} - {"True", "False"}:
         return [value == "True" for value in column]
     for kind in (int, float):
@@ -220,17 +220,17 @@ def _parsed(column: list[str]) -> list[Any]:
 
 
 def plain_configuration(configuration: Mapping[str, Any]) -> dict[str, Any]:
-    """A configuration as JSON gives it back, NumPy's values as numbers and lists of them.
+    """Return a configuration as JSON reads it back, NumPy's values as numbers and lists.
 
     Raises:
-        OptionError: if it holds a value that JSON cannot write.
+        OptionError: if it contains a value that JSON cannot store.
     """
     plain: dict[str, Any] = {}
     for field, value in configuration.items():
         try:
             plain[field] = json.loads(json.dumps(value, default=_from_numpy))
         except (TypeError, ValueError) as error:
-            allowed = f"values that JSON can write, to be stored in a folder ({error})"
+            allowed = f"values that JSON can store ({error})"
             raise OptionError(field, value, allowed) from error
     return plain
 
@@ -238,28 +238,28 @@ def plain_configuration(configuration: Mapping[str, Any]) -> dict[str, Any]:
 def _from_numpy(value: Any) -> Any:
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
-    raise TypeError(f"{type(value).__name__} is no type of JSON")
+    raise TypeError(f"{type(value).__name__} is not a JSON type")
 
 
 def claim(folder: Path, record: str, configuration: Mapping[str, Any]) -> Mapping[str, Any] | None:
-    """Make `folder` and return None, or the provenance in its `record` (a file name) if it is of this configuration.
+    """Create `folder` and return None, or return the provenance in its `record` (a file) of the same configuration.
 
     Raises:
-        StoreError: if the folder holds anything else than results of the same configuration.
+        StoreError: if the folder contains anything but results of the same configuration.
     """
     path = folder / record
     if path.exists():
-        with wrap_read_errors("output folder", folder, f"a folder whose {record} can be read", StoreError):
+        with wrap_read_errors("output folder", folder, f"a folder with a readable {record}", StoreError):
             content = json.loads(path.read_text(encoding="utf-8"))
             found = current_configuration(content["configuration"])
             before = dict(content.get("provenance", {}))
         if found != configuration:
             differs = [key for key in {*found, *configuration} if found.get(key) != configuration.get(key)]
-            allowed = f"a new folder; this one holds other results (different: {', '.join(sorted(differs))})"
+            allowed = f"a new folder; this one contains other results (different: {', '.join(sorted(differs))})"
             raise StoreError("output folder", str(folder), allowed)
         return before
     if folder.exists() and not (folder.is_dir() and is_empty(folder)):
-        raise StoreError("output folder", str(folder), "a new or empty folder; this one holds something else")
+        raise StoreError("output folder", str(folder), "a new or empty folder; this one contains other files")
     folder.mkdir(parents=True, exist_ok=True)
     return None
 
@@ -275,7 +275,7 @@ def check_replaceable(path: Path) -> None:
 
 
 def write_atomically(path: Path, write: Callable[[BinaryIO], Any], by_way_of: Path | None = None) -> None:
-    """Write a file so that it is there whole or not at all; until it is, it has another name in `by_way_of`.
+    """Write a file completely or not at all; until it is complete, it has a temporary name in `by_way_of`.
 
     Args:
         path: of the file.

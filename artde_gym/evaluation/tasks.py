@@ -1,4 +1,4 @@
-"""Tasks: the episodes of a plan in portions that workers run, and the progress of them all."""
+"""Tasks: portions of a plan's episodes for workers to run, and their overall progress."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from artde_gym.evaluation.vector_rollout import run_vector
 from artde_gym.registration import ControllerSpec
 
 CHUNK = 2500
-"""Most episodes that run at once in a vector environment: no result depends on it, and more would be little faster."""
+"""Most episodes that run at once in a vector environment: no result depends on it, and more is hardly faster."""
 
 
 SIDE_BY_SIDE = 128
@@ -23,7 +23,7 @@ SIDE_BY_SIDE = 128
 
 
 class Case(NamedTuple):
-    """One controller in one cell; `seed` is that of all its episodes."""
+    """One controller in one cell; `seed` is the base seed of all its episodes."""
 
     cell: Cell
     controller: str
@@ -33,7 +33,7 @@ class Case(NamedTuple):
 
 
 class Task(NamedTuple):
-    """Episodes of one controller that run at once: a single one, or a chunk. The first `record_episodes` leave traces.
+    """Episodes of one controller that run at once: one, or a chunk. The first `record_episodes` leave traces.
 
     `cells` are those of the episodes, which differ from `cell` by name and disturbances alone. `metrics` are the
     registered ones that the process must know.
@@ -53,7 +53,7 @@ class Task(NamedTuple):
 
 
 class Update(NamedTuple):
-    """Progress of an evaluation: one task's simulated time (s), whether it has ended, and how many episodes have."""
+    """Progress of an evaluation: one task's simulated time (s) and end, and the number of finished episodes."""
 
     task: Task
     time_s: float
@@ -63,12 +63,12 @@ class Update(NamedTuple):
 
 
 class Progress:
-    """Count of finished episodes, told to `on_progress` whenever a task goes on or ends.
+    """Counter of finished episodes, reported to `on_progress` whenever a task advances or ends.
 
     Args:
-        finished: how many there are already.
-        total: how many there will be.
-        on_progress: called with the news; None for nobody.
+        finished: number of episodes finished before.
+        total: number of all episodes.
+        on_progress: called with each update; None for no reports.
     """
 
     def __init__(self, finished: int, total: int, on_progress: Callable[[Update], None] | None) -> None:
@@ -76,11 +76,11 @@ class Progress:
         self._on_progress = on_progress
 
     def running(self, task: Task, time_s: float) -> None:
-        """Tell how far a task is."""
+        """Report a task's simulated time."""
         self._tell(task, time_s, False)
 
     def ended(self, task: Task, results: list[Episode]) -> None:
-        """Count a task's episodes."""
+        """Count a task's episodes and report its end."""
         self._finished += len(results)
         self._tell(task, max(result.row["duration_s"] for result in results), True)
 
@@ -99,13 +99,13 @@ def tasks_of(
     record_hz: float = 100.0,
     together: bool = False,
 ) -> Iterator[Task]:
-    """Portion out the episodes of all cases, chunk by chunk, so that an interruption leaves whole comparisons behind.
+    """Yield tasks for the episodes of all cases, chunk by chunk, so that an interruption leaves whole comparisons.
 
     Args:
-        cases: what is run; no two have both the cell's name and the controller in common.
-        episodes: of each case.
-        vectorized: of all of them.
-        done: cell's name, controller and number of the episodes that are left out.
+        cases: the cases to run; no two share both the cell's name and the controller.
+        episodes: number per case.
+        vectorized: whether chunks run in vector environments.
+        done: cell's name, controller and number of the episodes to leave out.
         record_episodes: the first so many episodes of each case leave traces.
         record_hz: rate of the traces.
         together: whether cases of one controller, whose cells differ by disturbances alone, run at once in a vector.
@@ -152,7 +152,7 @@ def _task(runs: list[tuple[Case, int]], vectorized: bool, record_episodes: int, 
 
 
 def chunks_of(episodes: int, size: int) -> list[range]:
-    """Divide episodes into equal runs of at most `size`."""
+    """Divide episodes into nearly equal ranges of at most `size`."""
     count = -(-episodes // size)
     edges = [episodes * i // count for i in range(count + 1)]
     return [range(first, stop) for first, stop in itertools.pairwise(edges)]
@@ -175,7 +175,7 @@ def run_task(task: Task, on_progress: Callable[[float], None]) -> list[Episode]:
 
 
 def labels_of(task: Task, number: int) -> dict[str, Any]:
-    """Name the columns that say which episode a row is of: the task's episode at place `number`."""
+    """Return the columns that identify a row's episode: the task's episode at index `number`."""
     return {
         "controller": task.controller,
         "env": task.cell.env_id,

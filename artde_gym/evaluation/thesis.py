@@ -1,4 +1,4 @@
-"""What a publication reports of a scenario, as the robots' kits have it, to be printed beside ours."""
+"""Reported results of a publication for a scenario, from the robots' kits, to be printed beside ours."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ _NOTHING = Reported("", {})
 
 
 _FIELDS = {"TABLES": "table", "VALUES": "values", "TIME_TO_FALL": "time_to_fall"}
-"""Old name of all tables -> field of `Reported`."""
+"""Former name of the tables of all robots -> field of `Reported`."""
 
 
 def __getattr__(name: str) -> Any:
-    """Answer to the names that the tables of all robots had once (PEP 562)."""
+    """Return a table of all robots by its former name (PEP 562)."""
     if name not in _FIELDS:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     warn(f"artde_gym.evaluation.thesis.{name}", "artde_gym.kit.ROBOTS[robot].reported")
@@ -24,18 +24,18 @@ def __getattr__(name: str) -> Any:
 
 
 def reported(scenario: str | None) -> Reported:
-    """Return what is reported of a scenario by its name there; empty where nothing is."""
+    """Return the reported results of a scenario by its name there; empty without any."""
     known = {name: found for kit in ROBOTS.values() for name, found in kit.reported.items()}
     return known.get(scenario or "", _NOTHING)
 
 
 def value(scenario: str | None, controller: str, metric: str, axis: str) -> float | None:
-    """Return the reported number, or None where there is none."""
+    """Return the reported number, or None without one."""
     return reported(scenario).values.get(controller, {}).get(metric, {}).get(axis)
 
 
 def ending(scenario: str | None, controller: str) -> str:
-    """Say how a reported episode ended, "" if there was none."""
+    """Describe the ending of a reported episode; "" without one."""
     found = reported(scenario)
     if controller in found.time_to_fall:
         return f"falls at {found.time_to_fall[controller]:g}"

@@ -1,4 +1,4 @@
-"""Many episodes at once: a vector environment, a policy and one seed an episode in; metrics out, hardly any traces."""
+"""Many episodes at once in a vector environment, one seed each, with metrics and a few traces as their result."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from artde_gym.evaluation.rollout import (
 )
 from artde_gym.info import fall_reason
 
-BLOCK = 4096  # samples of all episodes together that metrics take in at once: a call has its price
+BLOCK = 4096  # samples of all episodes together that metrics process at once, to amortize the cost of a call
 
 
 def run_vector(
@@ -36,10 +36,10 @@ def run_vector(
     phases: Sequence[Span] = (),
     on_progress: Callable[[float], None] | None = None,
 ) -> list[Episode]:
-    """Drive a vector environment from a reset with `seeds` until all its episodes have ended.
+    """Run a vector environment from a reset with `seeds` until all its episodes have ended.
 
-    All metrics are those of `run_episode`. Nothing of an episode depends on the others beside it. An episode that has
-    ended counts no more; the environment may go on with it as it likes.
+    All metrics are those of `run_episode`. No episode depends on the others. Samples after an episode's end do not
+    count; the environment may do anything with it then.
 
     Args:
         env: a vector environment of this project, of as many environments as there are seeds.
@@ -49,7 +49,7 @@ def run_vector(
         record_hz: rate of the traces, at most the control rate; infinite for every sample.
         record_episodes: the first so many episodes leave traces.
         phases: see `Metrics`.
-        on_progress: called with the simulated time (s) about once a simulated second.
+        on_progress: called with the simulated time (s), about once per simulated second.
     """
     period: float = env.control_period
     stride = max(1, round(1.0 / (record_hz * period)))
@@ -86,7 +86,7 @@ def run_vector(
             metrics.add(k - len(block), split(np.array(block)), stack(insides), live)
             block, insides = [], []
         if ended.any():
-            metrics.add(k, split(observation[None]), None, ended)  # nothing is decided there any more
+            metrics.add(k, split(observation[None]), None, ended)  # no decision follows the last observation
             steps[ended] = k
             reasons |= {int(i): fall_reason(info, int(i)) for i in np.flatnonzero(live & terminated)}
             live = live & ~ended
@@ -110,19 +110,19 @@ class _Traces:
         self._diagnostics: list[dict[str, Array]] = []
 
     def observe(self, step: int, observation: Array, info: Mapping[str, Any]) -> None:
-        """Keep what is seen after so many steps."""
+        """Store observations and info after `step` steps."""
         if self._count and step % self._stride == 0:
             self._observations.append(observation[: self._count].copy())
             told = self._env.metrics_spec.recorded_info
             self._told.append({name: np.array(info[name][: self._count]) for name in told})
 
     def diagnose(self, step: int, values: Mapping[str, Array]) -> None:
-        """Keep what the policy knew when it decided."""
+        """Store the policy's diagnostics at a decision."""
         if self._count and step % self._stride == 0:
             self._diagnostics.append({name: value[: self._count].copy() for name, value in values.items()})
 
     def of(self, episode: int, steps: int) -> dict[str, Array]:
-        """Return the traces of one episode of so many steps."""
+        """Return the traces of one episode of `steps` steps."""
         seen, decided = steps // self._stride + 1, (steps - 1) // self._stride + 1
         fields = self._env.observation_layout.split(np.array([sample[episode] for sample in self._observations[:seen]]))
         known, own = (

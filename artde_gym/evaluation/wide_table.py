@@ -8,7 +8,7 @@ import pandas as pd
 
 
 class WideTable(pd.DataFrame):
-    """A data frame whose text breaks into blocks of columns where it is too wide, instead of leaving columns out."""
+    """A data frame that prints wide tables in blocks of columns instead of leaving columns out."""
 
     @property
     def _constructor(self) -> type[WideTable]:

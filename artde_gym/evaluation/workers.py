@@ -1,4 +1,4 @@
-"""Jobs in this process, or on several of this machine that have one core each and end with it; in any order."""
+"""Parallel jobs, in any order: in this process, or in several local ones with one core each that end with it."""
 
 from __future__ import annotations
 
@@ -24,45 +24,45 @@ from artde_gym.arguments import check_integer
 from artde_gym.errors import OptionError, WorkerError
 
 AHEAD = 2
-"""Jobs a worker that are handed out at once: no worker waits for its next one, and a million of them do not pile up."""
-PATIENCE = 0.2  # s between two looks at the progress
+"""Jobs per worker that are submitted at once: no worker waits for its next one, and a million jobs do not pile up."""
+PATIENCE = 0.2  # s between two checks of the progress
 GRACE = 5.0
-"""Time (s) that workers have to stop by themselves after an interruption; a second one ends them at once."""
+"""Time (s) for workers to stop by themselves after an interruption; a second interruption ends them at once."""
 UNGUARDED = 79
-"""Exit code of a worker that would have started workers of its own, since its script starts them when imported."""
+"""Exit code of a worker that would start workers itself, because its script starts them at import."""
 MOST_WORKERS = 1024
 DEATHS = 3
-"""How often in a row a worker may end, without a finished job in between, before the jobs are believed to kill it."""
-GUARD = "a script that starts nothing when it is imported: put the call below `if __name__ == '__main__':`"
+"""Number of deaths in a row, without a finished job in between, after which the jobs are believed to kill workers."""
+GUARD = "a script that starts nothing at import; put the call below `if __name__ == '__main__':`"
 
 Job = Any
 Work = Callable[[Job, Callable[[float], None]], Any]
-"""What is done with a job: a function of a module, called with it and with what takes simulated times (s)."""
+"""The work on a job: a module-level function that takes the job and a callback for simulated times (s)."""
 OnTime = Callable[[Job, float], None]
 Runs = Generator[tuple[Job, Any], None, None]
 """Jobs with their results."""
 
 
 def run_jobs(work: Work, jobs: Iterable[Job], workers: int, on_time: OnTime) -> Runs:
-    """Do the jobs in this process if one is asked for, else on so many.
+    """Run the jobs in this process for one worker, else in that many processes.
 
     Raises:
-        WorkerError: as `run_parallel`.
+        WorkerError: as for `run_parallel`.
     """
     return run_here(work, jobs, on_time) if workers == 1 else run_parallel(work, jobs, workers, on_time)
 
 
 def run_here(work: Work, jobs: Iterable[Job], on_time: OnTime) -> Runs:
-    """Do the jobs in this process, one after another."""
+    """Run the jobs in this process, one after another."""
     for job in jobs:
         yield job, work(job, functools.partial(on_time, job))
 
 
 def run_parallel(work: Work, jobs: Iterable[Job], workers: int, on_time: OnTime) -> Runs:
-    """Do the jobs on so many processes; what a worker was at when it was killed is done again.
+    """Run the jobs in `workers` processes; jobs of a killed worker are run again.
 
     Raises:
-        WorkerError: if workers keep ending before any job is done, or if the script that calls this has no main guard.
+        WorkerError: if workers keep ending before a job is done, or if the calling script has no main guard.
     """
     check_workers(workers)
     numbered, held = enumerate(jobs), dict[int, Job]()
@@ -76,14 +76,14 @@ def run_parallel(work: Work, jobs: Iterable[Job], workers: int, on_time: OnTime)
                 return
             except BrokenProcessPool:
                 deaths += 1
-    allowed = "workers that live; if memory is short, take fewer of them"
+    allowed = "workers that keep running; if memory is short, use fewer workers"
     raise WorkerError("worker processes", f"ended {DEATHS} times before a job was done", allowed)
 
 
 def _run_until_a_death(
     work: Work, numbered: Iterator[tuple[int, Job]], held: dict[int, Job], workers: int, on_time: OnTime
 ) -> Runs:
-    """As `run_parallel`; `held` are the jobs by number that have been handed out and are not done.
+    """Run jobs as `run_parallel` does; `held` contains the submitted, unfinished jobs by number.
 
     Raises:
         BrokenProcessPool: when a worker was killed.
@@ -129,7 +129,7 @@ def _run_until_a_death(
 
 
 class _Crew:
-    """Processes that `context` starts as `spawn` does, since a fork would copy physics clients and locks."""
+    """Processes that `context` starts with `spawn`, since a fork would copy physics clients and locks."""
 
     def __init__(self) -> None:
         self.context: Any = SpawnContext()
@@ -141,7 +141,7 @@ class _Crew:
         return self.workers[-1]
 
     def end(self) -> None:
-        """Wait until all workers have ended; kill what is still there after a while, or at once when interrupted."""
+        """Wait until all workers have ended; kill the remaining ones after a while, or at once when interrupted."""
         running = {worker.sentinel: worker for worker in self.workers if worker.pid is not None}
         deadline = time.monotonic() + GRACE
         with contextlib.suppress(KeyboardInterrupt):
@@ -149,7 +149,7 @@ class _Crew:
                 ended: list[Any] = connection.wait(list(running), left)
                 for sentinel in ended:
                     del running[sentinel]
-        with ignored_interrupt():  # there is nothing more to wait for
+        with ignored_interrupt():  # nothing is left to wait for
             for worker in running.values():
                 worker.kill()
                 worker.join()
@@ -158,7 +158,7 @@ class _Crew:
 def check_workers(workers: Any) -> None:
     """Check a number of workers before anything is written.
 
-    A worker that gets here while it imports its parent's script, which has no main guard, ends at once.
+    A worker that gets here while it imports its parent's script, which then has no main guard, ends at once.
 
     Raises:
         OptionError: unless it is a whole number from 1 to `MOST_WORKERS`.
@@ -168,28 +168,28 @@ def check_workers(workers: Any) -> None:
 
 
 def end_unguarded() -> None:
-    """End a worker that would start workers of its own, since its script starts them when it is imported."""
-    if getattr(multiprocessing.current_process(), "_inheriting", False):  # as multiprocessing itself asks
+    """End a worker that would start workers itself, because its script starts them at import."""
+    if getattr(multiprocessing.current_process(), "_inheriting", False):  # the check that multiprocessing itself uses
         sys.exit(UNGUARDED)
 
 
 def check_picklable(named: Mapping[str, Any], gains: Mapping[str, dict[str, Any]]) -> None:
-    """See that controllers can be sent to other processes.
+    """Check that controllers can be sent to other processes.
 
     Raises:
-        OptionError: if one cannot.
+        OptionError: if one cannot be pickled.
     """
     for name, item in named.items():
         try:
             pickle.dumps((item, gains.get(name)))
         except Exception as error:  # pickling runs code of the policy's class
-            allowed = f"one that can be pickled, to be sent to several workers; or workers=1 ({error})"
+            allowed = f"a picklable controller for several workers, or workers=1 ({error})"
             raise OptionError(f"controller {name!r}", item, allowed) from error
 
 
 @contextlib.contextmanager
 def _one_thread_each() -> Generator[None, None, None]:
-    """Workers started meanwhile have one core each."""
+    """Limit workers started meanwhile to one core each."""
     before = os.environ.get("OMP_NUM_THREADS")
     os.environ["OMP_NUM_THREADS"] = "1"
     try:
@@ -203,7 +203,7 @@ def _one_thread_each() -> Generator[None, None, None]:
 
 @contextlib.contextmanager
 def ignored_interrupt() -> Generator[None, None, None]:
-    """Ctrl-C is ignored, here and by processes that are started meanwhile: it goes to all, and the parent decides."""
+    """Ignore Ctrl-C here and in processes started meanwhile: it reaches all, and the parent decides."""
     if threading.current_thread() is not threading.main_thread():
         yield  # only the main thread may set handlers, and only it is interrupted
         return
@@ -215,21 +215,21 @@ def ignored_interrupt() -> Generator[None, None, None]:
 
 
 _worker: dict[str, Any] = {}
-"""A worker process's own: the channel for its progress and the flag that asks it to stop."""
+"""State of a worker process: the channel for its progress and the flag that asks it to stop."""
 
 
 class _StoppedError(Exception):
-    """Raised in a worker in the middle of a job that nobody waits for."""
+    """Stop of a worker in the middle of a job whose result is no longer needed."""
 
 
 def _start_worker(channel: Any, stop: Any) -> None:
-    channel.cancel_join_thread()  # one that was killed in the middle of a message must not hold the others up
+    channel.cancel_join_thread()  # a worker killed in the middle of a message must not block the others
     _worker.update(channel=channel, stop=stop)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
 def _end_with_parent() -> None:
-    """Workers hold each other's pipes open, so that none would notice a parent that was killed."""
+    """End this worker when its parent dies; the workers keep each other's pipes open and would not notice."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()

@@ -1,4 +1,4 @@
-"""A report that people look at: one HTML file that needs no network, from a results folder alone."""
+"""HTML report of a results folder: one file that needs neither a network nor the environment."""
 
 from artde_gym.report.report import write_report
 

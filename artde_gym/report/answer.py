@@ -1,4 +1,4 @@
-"""The answer in words: who is better, by how much, with what certainty."""
+"""The result in words: the best controller, its lead, and the certainty."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.statistics import Estimate
 from artde_gym.metrics_spec import MetricsSpec
 
-FEW = 6  # seeds, below which an interval is itself uncertain
+FEW = 6  # seeds; with fewer, an interval is itself uncertain
 
 
 def ranking(result: Result, scenario: str, metric: str) -> list[str]:
-    """Controllers by how often they fall; among those that fall as often, by their mean error."""
+    """Return controllers by number of falls; for equal numbers, by mean error."""
 
     def order(name: str) -> tuple[float, float]:
         _, rate = result.falls(scenario, name)
@@ -25,19 +25,19 @@ def ranking(result: Result, scenario: str, metric: str) -> list[str]:
 
 
 def headline(result: Result, trackings: dict[str, MetricsSpec]) -> str:
-    """One sentence over all scenarios."""
+    """Return one sentence over all scenarios."""
     if len(result.controllers) == 1:
         return f"{result.controllers[0]} was evaluated alone: there is nothing to compare it with."
     won: dict[str, list[str]] = {}
     for scenario in result.scenarios:
         best = ranking(result, scenario, metric_of(trackings[scenario]))[0]
-        won.setdefault("nobody" if _all_fall(result, scenario) else best, []).append(scenario)
+        won.setdefault("no controller" if _all_fall(result, scenario) else best, []).append(scenario)
     parts = [f"{name} in {', '.join(scenarios)}" for name, scenarios in sorted(won.items(), key=lambda x: -len(x[1]))]
     return f"Best, by falls first and RMS error second: {'; '.join(parts)}."
 
 
 def sentences(result: Result, scenario: str, tracking: MetricsSpec) -> list[str]:
-    """What a scenario shows: the leader's falls and error, then how the others compare with it, the closest first."""
+    """Describe a scenario's result: the leader's falls and error, then the comparisons with it, closest first."""
     metric = metric_of(tracking)
     best, *rivals = names = ranking(result, scenario, metric)
     count = min(len(result.rows(scenario, name)) for name in names)
@@ -80,7 +80,7 @@ def _all_fall(result: Result, scenario: str) -> bool:
 
 
 def metric_of(tracking: MetricsSpec) -> str:
-    """Name of the RMS error that controllers are ranked by."""
+    """Return the name of the RMS error that ranks the controllers."""
     return f"rmse_{tracking.errors[0].unit}"
 
 

@@ -1,7 +1,7 @@
-"""Small charts as SVG text that takes its ink from the page, so that one file serves light, dark and paper.
+"""Small charts as SVG that inherit the page's colors, so that one file serves light and dark modes and print.
 
 A chart is drawn at a fixed size in its own units and scales with the page. Lines are thinned to the smallest and the
-largest value in each of `COLUMNS` columns: no peak is lost, and a minute of signals weighs a few kilobytes.
+largest value in each of `COLUMNS` columns: no peak is lost, and a minute of signals takes a few kilobytes.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ SHAPES: dict[str, str] = {
 
 
 class Axis(NamedTuple):
-    """What an axis shows: its label with the unit, and its range; in decades where `log` is true."""
+    """An axis: its label with the unit, and its range; logarithmic if `log` is true."""
 
     label: str
     low: float
@@ -49,7 +49,7 @@ class Axis(NamedTuple):
 
     @classmethod
     def of(cls, label: str, *values: ArrayLike, log: bool = False, zero: bool = False) -> Axis:
-        """An axis over all finite values with a little room; from zero on where `zero` is true."""
+        """Return an axis over all finite values with some margin; from zero if `zero` is true."""
         flat = np.concatenate([np.asarray(value, dtype=np.float64).ravel() for value in values] or [np.zeros(0)])
         flat = flat[np.isfinite(flat) & (flat > 0 if log else True)]
         low, high = (float(flat.min()), float(flat.max())) if len(flat) else (0.1, 1.0)
@@ -61,7 +61,7 @@ class Axis(NamedTuple):
         return cls(label, low if zero and low == 0 else low - room, high + room)
 
     def place(self, values: ArrayLike) -> Array:
-        """Values as shares of the axis, 0 to 1; NaN for what a logarithmic axis cannot show."""
+        """Return values as fractions of the axis, 0 to 1; NaN for values that a logarithmic axis cannot show."""
         array = np.asarray(values, dtype=np.float64)
         if not self.log:
             return (array - self.low) / (self.high - self.low)
@@ -70,7 +70,7 @@ class Axis(NamedTuple):
         return np.where(array > 0, np.maximum(share, 0.0), np.nan)
 
     def ticks(self) -> list[float]:
-        """Round values within the range, about `TICKS` of them."""
+        """Return round values within the range, about `TICKS` of them."""
         if self.log:
             first, last = round(math.log10(self.low)), round(math.log10(self.high))
             if last - first < TICKS / 2:
@@ -89,10 +89,10 @@ class Chart:
     """One drawing with two axes.
 
     Args:
-        name: what it shows, for those who do not see it; the page's caption says more.
+        name: alternative text for screen readers; the page's caption says more.
         x, y: axes.
         width, height: in its own units; a unit is about a pixel.
-        names: positions on the x axis that have a name in place of a number.
+        names: positions on the x axis that are labeled with a name instead of a number.
         frame: whether axes are drawn.
     """
 
@@ -112,7 +112,7 @@ class Chart:
         self._parts = [self._frame(names)] if frame else []
 
     def line(self, x: ArrayLike, y: ArrayLike, look: Style, *, text: str = "", kind: str = "line") -> None:
-        """Connect points, thinned; gaps where a value is not finite."""
+        """Draw a thinned line; values that are not finite leave gaps."""
         across, up = self._points(x, y)
         if len(across) > 2 * COLUMNS and kind != "path":
             across, up = _thinned(across, up)
@@ -121,7 +121,7 @@ class Chart:
         )
 
     def reference(self, x: ArrayLike, y: ArrayLike, text: str = "reference") -> None:
-        """A dashed line in the page's own ink: what is meant to be followed."""
+        """Draw a dashed line in the page's text color: the reference."""
         across, up = self._points(x, y)
         self._parts.append(f'<path class="reference" d="{_path(*_thinned(across, up))}">{_title(text)}</path>')
 
@@ -135,7 +135,7 @@ class Chart:
             )
 
     def interval(self, x: float, low: float, high: float, look: Style) -> None:
-        """A vertical bar, from low to high."""
+        """Draw a vertical bar from low to high."""
         (across, _), ups = self._points([x, x], [low, high])
         if np.isfinite(ups).all():
             self._parts.append(
@@ -143,13 +143,13 @@ class Chart:
             )
 
     def dash(self, x: float, y: float, text: str) -> None:
-        """A short horizontal mark: a value that somebody else reports."""
+        """Draw a short horizontal mark: a published value."""
         (across,), (up,) = self._points([x], [y])
         if math.isfinite(up):
             self._parts.append(f'<path class="dash" d="M{across - 7:.1f} {up:.1f}h14">{_title(text)}</path>')
 
     def cross(self, x: float, y: float, look: Style, text: str) -> None:
-        """A cross: here it fell."""
+        """Draw a cross that marks a fall."""
         (across,), (up,) = self._points([x], [y])
         if math.isfinite(across + up):
             place = f"translate({across:.1f} {up:.1f})"
@@ -159,12 +159,12 @@ class Chart:
             )
 
     def event(self, begin: float, end: float, text: str) -> None:
-        """A vertical mark from `begin` to `end`, named at the top."""
+        """Draw a vertical mark from `begin` to `end`, labeled at the top."""
         if not self.x.low <= begin <= self.x.high:
             return
         (first, last), _ = self._points([begin, min(end, self.x.high)], [self.y.low] * 2)
         size = self.height - TOP - BOTTOM
-        late = first > 0.8 * self.width  # no room for words on its right
+        late = first > 0.8 * self.width  # no room for the label on its right
         place = f'x="{first - 4:.1f}" text-anchor="end"' if late else f'x="{first + 4:.1f}"'
         self._parts.append(
             f'<g class="event"><rect x="{first:.1f}" y="{TOP}" width="{max(last - first, 1.5):.1f}" height="{size}"/>'
@@ -172,7 +172,7 @@ class Chart:
         )
 
     def level(self, y: float, text: str, look: Style | None = None) -> None:
-        """A horizontal line with its meaning at the right end."""
+        """Draw a horizontal line, labeled at its right end."""
         (_,), (up,) = self._points([self.x.low], [y])
         if TOP <= up <= self.height - BOTTOM:
             style = f' style="--c:{look.color}"' if look else ""
@@ -182,7 +182,7 @@ class Chart:
             )
 
     def guide(self, x: ArrayLike, y: ArrayLike) -> None:
-        """A thin line of no weight of its own, as a grid has them."""
+        """Draw a thin line in the grid's style."""
         self._parts.append(f'<path class="grid" d="{_path(*self._points(x, y))}"/>')
 
     def text(self, x: float, y: float, text: str) -> None:
@@ -207,7 +207,7 @@ class Chart:
         )
 
     def file(self) -> str:
-        """The chart as an SVG file of its own, in the colors of the reports."""
+        """Return the chart as a standalone SVG file, in the colors of the reports."""
         style = "".join((_ASSETS / name).read_text(encoding="utf-8") for name in ("style.css", "chart.css"))
         size = f'xmlns="http://www.w3.org/2000/svg" width="{2 * self.width}" height="{2 * self.height}"'
         whole = self.svg().replace("<svg ", f"<svg {size} ", 1)
@@ -241,12 +241,12 @@ class Chart:
 
 
 def height_of(x: Axis, y: Axis, width: int) -> int:
-    """The height of a chart of this width in which a unit is as long on both axes."""
+    """Return the height of a chart of this width with equal units on both axes."""
     return round((width - LEFT - RIGHT) * (y.high - y.low) / (x.high - x.low)) + TOP + BOTTOM
 
 
 def _thinned(x: Array, y: Array) -> tuple[Array, Array]:
-    """The smallest and the largest `y` of each column, in their order, and both ends."""
+    """Return the smallest and the largest `y` of each column in order, and both ends."""
     if len(x) <= 2 * COLUMNS:
         return x, y
     edges = np.linspace(0, len(x), COLUMNS + 1).astype(int)

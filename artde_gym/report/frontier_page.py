@@ -1,4 +1,4 @@
-"""The part of a report that shows a frontier."""
+"""Report of a frontier."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ Rows = list[dict[Any, Any]]
 
 
 def read_frontier(folder: Path) -> tuple[Frontier, dict[str, Any]]:
-    """A frontier's folder, finished or not, and its record.
+    """Read a frontier's folder, finished or not, and its record.
 
     Raises:
-        StoreError: if it cannot be read.
+        StoreError: if it is not readable.
     """
     try:
         record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
@@ -42,7 +42,7 @@ def read_frontier(folder: Path) -> tuple[Frontier, dict[str, Any]]:
 
 
 def answer(found: Frontier) -> tuple[str, list[str]]:
-    """A headline, and a sentence on each controller."""
+    """Return a headline, and a sentence on each controller."""
     axis, rows = found.axis, _records(found.table)
     known = [row for row in rows if math.isfinite(row["frontier"]) and row["relation"] in ("=", ">=", "<=")]
     lines = [_sentence(row, found) for row in rows]
@@ -58,7 +58,7 @@ def answer(found: Frontier) -> tuple[str, list[str]]:
 
 
 def parts(found: Frontier) -> list[str]:
-    """Chart and tables."""
+    """Return chart and tables."""
     axis = found.axis
     shown = styles(str(row["controller"]) for row in _records(found.table))
     caption = "Survival with 95 % intervals (Wilson); markers side by side are one level."

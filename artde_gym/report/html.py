@@ -1,4 +1,4 @@
-"""The page around tables and charts: one file that needs nothing else."""
+"""HTML page around tables and charts: one self-contained file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ REPLAY = '<div class="replay"'
 
 
 class Cell(NamedTuple):
-    """Text of a table, and the number that it is sorted by, if not by the text."""
+    """A table cell: its text, and the number it is sorted by, if not the text."""
 
     text: str
     value: float | None = None
@@ -39,27 +39,27 @@ def page(title: str, body: Iterable[str]) -> str:
 
 
 def section(title: str, *parts: str) -> str:
-    """Parts under a head; empty ones are left out."""
+    """Return parts under a heading; empty ones are left out."""
     return f"<section>\n<h2>{escape(title)}</h2>\n" + "\n".join(part for part in parts if part) + "\n</section>"
 
 
 def paragraph(text: str, kind: str = "") -> str:
-    """Words; the kind is a class of the style sheet."""
+    """Return a paragraph; `kind` is a class of the style sheet."""
     return f"<p{_kind(kind)}>{escape(text)}</p>"
 
 
 def bullets(texts: Iterable[str]) -> str:
-    """Sentences one below the other."""
+    """Return sentences as a list."""
     return "<ul>" + "".join(f"<li>{escape(text)}</li>" for text in texts) + "</ul>"
 
 
 def details(summary: str, *parts: str) -> str:
-    """What is folded away until asked for; on paper it is open."""
+    """Return parts that are folded away on the screen and open in print."""
     return f"<details><summary>{escape(summary)}</summary>\n" + "\n".join(parts) + "\n</details>"
 
 
 def table(caption: str, columns: Sequence[str], rows: Iterable[Sequence[str | Cell]]) -> str:
-    """A table that sorts by the column whose head is pressed; the first cell of a row is its head."""
+    """Return a table that sorts by the column whose header is clicked; the first cell of a row is its header."""
     rows = list(rows)
     kinds = (
         [_kind("text" if isinstance(cell, Cell) and cell.kind == "text" else "") for cell in rows[0]] if rows else []
@@ -82,7 +82,7 @@ def table(caption: str, columns: Sequence[str], rows: Iterable[Sequence[str | Ce
 def figure(
     caption: str, charts: Mapping[str, str], legend: Mapping[str, Style] | None = None, *, kind: str = "charts"
 ) -> str:
-    """Charts by their heads, side by side where there is room, under one legend; or "snapshots", or a "video"."""
+    """Return charts by heading, side by side if there is room, under one legend; or "snapshots", or a "video"."""
     drawn = "".join(
         f'<div class="chart">{f"<h4>{escape(head)}</h4>" if head else ""}{svg}</div>' for head, svg in charts.items()
     )

@@ -1,4 +1,4 @@
-"""What the controllers of a run were: their gains, and what follows from them."""
+"""Gains of a run's controllers, and the conditions that follow from them."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.html import Cell, details, figure, paragraph, table
 from artde_gym.report.run import Run
 
-SAMPLES = 200  # of the reference, at which the inertia is taken
+SAMPLES = 200  # of the reference, at which the inertia is computed
 LOOP = {"position": "_p", "attitude": "_q"}
 
 Gains = Mapping[str, Any]
 
 
 class Laws:
-    """The gains of a run's controllers, built anew by their names; one of a name that is not registered has none."""
+    """The gains of a run's controllers, rebuilt by name; an unregistered name has none."""
 
     def __init__(self, run: Run) -> None:
         self._run = run
-        self.gains = functools.cache(self._find_gains)  # scenario -> the same dict, found once a report
+        self.gains = functools.cache(self._find_gains)  # scenario -> the same dict, found once per report
 
     def robot(self, scenario: str) -> Any:
-        """The nominal robot: a `RobotSpec`, or a plug-in's own model."""
+        """Return the nominal robot: a `RobotSpec`, or a plug-in's own model."""
         return self._environment(scenario).unwrapped.nominal_robot
 
     def _find_gains(self, scenario: str) -> dict[str, Gains]:
-        """Controller -> gain -> value; those of a cascade's loops end in _p and _q."""
+        """Return controller -> gain -> value; names of a cascade's gains end in _p and _q."""
         env, found, given = self._environment(scenario), {}, self._run.gains(scenario)
         for name in self._run.result.controllers:
             if name in registered_controllers():
@@ -49,7 +49,7 @@ class Laws:
         return found
 
     def lyapunov_matrix(self, scenario: str) -> tuple[str, Array, Array, Array] | None:
-        """(controller, p11, p12, p22) of P in A^T P + P A = -I, for one controller's Kp and Kd; None if none has them.
+        """Return (controller, p11, p12, p22) of P in A^T P + P A = -I for one controller's Kp and Kd; None without any.
 
         With scalar gains, p12 = 1 / (2 Kp), p22 = (1 + Kp) / (2 Kp Kd), p11 = Kd p12 + Kp p22.
         """
@@ -63,7 +63,7 @@ class Laws:
         return None
 
     def section(self, scenario: str) -> list[str]:
-        """Gains as a table, and the condition under which time-delay estimation converges."""
+        """Return the gains as a table, and the convergence condition of time-delay estimation."""
         gains = self.gains(scenario)
         names = list(dict.fromkeys(gain for own in gains.values() for gain in own))
         rows = [[gain, *(_shown(own.get(gain)) for own in gains.values())] for gain in names]
@@ -71,7 +71,7 @@ class Laws:
         return parts + self._validity(scenario)
 
     def _validity(self, scenario: str) -> list[str]:
-        """Eigenvalues of M^-1 m_bar, which have to lie in (0, 2)."""
+        """Return charts of the eigenvalues of M^-1 m_bar, which must lie in (0, 2)."""
         nominal = {}
         for name, own in self.gains(scenario).items():
             for gain in ("m_bar", "m_bar_p", "m_bar_q"):
@@ -133,9 +133,9 @@ class Laws:
 
 
 def inertia_of(robot: Any) -> Callable[[Array], Array] | None:
-    """Return the joint-space inertia (..., n, n) of a nominal robot as a function of q (..., n); None if it tells none.
+    """Return the joint-space inertia (..., n, n) of a nominal robot as a function of q (..., n); None without one.
 
-    A plug-in's own model may have it as `joint_inertia`.
+    A plug-in's own model may provide it as `joint_inertia`.
     """
     if isinstance(robot, RobotSpec):
         tree = RigidBodyTree(robot)
@@ -144,7 +144,7 @@ def inertia_of(robot: Any) -> Callable[[Array], Array] | None:
 
 
 def unavailable(error: Exception) -> str:
-    """What stands in place of this section where a controller or an environment cannot be built any more."""
+    """Return the text for a controller or an environment that can no longer be built."""
     return paragraph(f"Gains are not shown: {error}.", "soft")
 
 

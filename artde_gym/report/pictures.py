@@ -1,7 +1,7 @@
-"""Pictures and a video of the episode that a report shows, run once more from its seed.
+"""Frames and a video of the episode that a report shows, rerun from its seed.
 
-Episodes repeat bit for bit, so that a picture is of the very run whose signals are plotted. One that does not repeat,
-on another machine or with another release of an engine, is told by its fall, and is not shown as if it were the same.
+Episodes repeat bit for bit, so that a frame is of the very run whose signals are plotted. An episode that does not
+repeat, e.g. on another machine or with another release of an engine, is recognized by its fall and not shown.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ from artde_gym.report.run import Run, nested
 from artde_gym.video.frames import Frame, render_frames
 from artde_gym.video.recording import video
 
-WIDTH = 320  # pixels, of a picture
+WIDTH = 320  # pixels, of a snapshot
 PANEL = 400  # pixels, of a controller in a video
 FPS = 20.0  # of a video
-QUALITY = 72  # of a picture as WebP
+QUALITY = 72  # of a snapshot as WebP
 BEFORE_FALL = (1.2, 0.8, 0.4, 0.2, 0.0)  # s
 BEFORE_EVENT, AFTER_EVENT = 0.1, (0.3, 0.8, 1.5)  # s
-MOTION = 6  # pictures of the undisturbed motion
-LENGTH, LEAD = 10.0, 6.0  # s, of a video, and how much of it is before what is to be seen
+MOTION = 6  # snapshots of the undisturbed motion
+LENGTH, LEAD = 10.0, 6.0  # s, of a video, and its part before the moment of interest
 
 Progress = Callable[[str], None]
 
 
 class Snapshot(NamedTuple):
-    """One picture of a strip: when (s), and what it shows in words."""
+    """One frame of a strip: its time (s), and a description."""
 
     strip: str
     time_s: float
@@ -52,11 +52,11 @@ class Snapshot(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class SnapshotSet:
-    """Pictures, and perhaps videos, of a run.
+    """Snapshots, and optionally videos, of a run.
 
     Attributes:
-        pictures, videos: what is asked for.
-        on_progress: called with what is being drawn.
+        pictures, videos: whether to draw them.
+        on_progress: called with the figure being drawn.
     """
 
     run: Run
@@ -65,13 +65,13 @@ class SnapshotSet:
     on_progress: Progress = lambda _: None
 
     def figures(self, scenario: str) -> list[str]:
-        """What there is to see of a scenario; a sentence in place of what cannot be drawn here."""
+        """Return the figures of a scenario; a sentence for those that cannot be drawn here."""
         parts: list[str] = []
         for wanted, draw in ((self.videos, self._video), (self.pictures, self._pictures)):
             if wanted:
                 try:
                     parts += draw(scenario)
-                except (ArtdeGymError, ValueError) as error:  # no OpenGL, no ffmpeg, a controller of then
+                except (ArtdeGymError, ValueError) as error:  # no OpenGL, no ffmpeg, a controller that no longer exists
                     parts.append(paragraph(f"Nothing is drawn here: {error}.", "soft"))
         return parts
 
@@ -130,11 +130,11 @@ class SnapshotSet:
             data = base64.b64encode(file.read_bytes()).decode()
         label = escape(f"{scenario}: {', '.join(names)} on the same seed", quote=True)
         moving = f'<video controls muted playsinline aria-label="{label}" src="data:video/mp4;base64,{data}"></video>'
-        caption = f"{', '.join(names)} on the same seed, episode {number}, from {start:.0f} s on."
+        caption = f"{', '.join(names)} on the same seed, episode {number}, from {start:.0f} s."
         return [figure(caption, {"": moving}, kind="video")]
 
     def _moment(self, scenario: str, rows: list[Row]) -> float:
-        """What a video should not miss: the first fall, else the first later event, else the motion."""
+        """Return the moment that a video must show: the first fall, else the first later event, else the motion."""
         falls = [float(row["time_to_fall_s"]) for row in rows if row["fell"]]
         if falls:
             return min(falls)
@@ -143,14 +143,14 @@ class SnapshotSet:
         return min([*later, settled + LEAD])
 
     def _moving(self, scenario: str, name: str, row: Row) -> list[Snapshot]:
-        """One period of the motion."""
+        """Return snapshots of one period of the motion."""
         motion, settled, period = ROBOTS[robot_of(self.run.cell(scenario)["env_id"])].motion
         start, span = min(settled, 0.3 * row["duration_s"]), min(period, 0.6 * row["duration_s"])
         times = [start + span * i / MOTION for i in range(MOTION)]
         return [Snapshot(f"The {motion} under {name}", time, f"{time:.2f} s") for time in times]
 
     def _seen(self, scenario: str, name: str, row: Row, snapshots: Iterable[Snapshot]) -> dict[float, Frame]:
-        """Shots by the time that they were wanted at; none after the end of an episode that ended earlier."""
+        """Return frames by their requested times; none after the end of an episode that ended earlier."""
         cell, times = self.run.cell(scenario), sorted({snapshot.time_s for snapshot in snapshots})
         spec, gains = registered_controllers()[name], self.run.gains(scenario).get(name, {})
         return dict(
@@ -162,7 +162,7 @@ class SnapshotSet:
         )
 
     def _number(self, scenario: str) -> int:
-        """The episode that the report's plots show, or the first one."""
+        """Return the episode that the report's plots show, or the first one."""
         shown = self.run.episode(scenario)
         return shown.number if shown else min(self.run.result.episodes["episode"].tolist())
 
@@ -170,7 +170,7 @@ class SnapshotSet:
         return {str(key): value for key, value in self.run.result.rows(scenario, name).loc[number].items()}
 
     def _drawable(self, scenario: str) -> list[str]:
-        """Controllers that finished the episode and can be built by their name, the best one first."""
+        """Return controllers that finished the episode and can be built by name, the best first."""
         number, result = self._number(scenario), self.run.result
         order = ranking(result, scenario, metric_of(self.run.tracking(scenario)))
         done = [name for name in order if number in result.rows(scenario, name).index]
@@ -189,7 +189,7 @@ def _falling(name: str, row: Row) -> list[Snapshot]:
 
 
 def _events(name: str, row: Row) -> list[Snapshot]:
-    """Before, during and after each push and drop that the episode reached."""
+    """Return snapshots before, during and after each push and drop that the episode reached."""
     snapshots = []
     for event, (begin, end) in _spans(row).items():
         strip = f"{event} at {begin:g} s{_force(row, event)} under {name}"
@@ -205,13 +205,13 @@ def _force(row: Row, event: str) -> str:
 
 
 def _spans(row: Row) -> Mapping[str, Span]:
-    """The episode's pushes and drop."""
+    """Return the episode's pushes and drop."""
     drawn = nested({key: value for key, value in row.items() if key.startswith("disturbance.")})
     return {event: span for event, span in events_of(drawn).items() if span[0] < row["duration_s"]}
 
 
 def _repeats(row: Row, seen: Mapping[float, Frame]) -> bool:
-    """Whether a run went as the stored one: the same fall at the same time, or none."""
+    """Return whether a run matches the stored one: the same fall at the same time, or none."""
     falls = [frame.time_s for frame in seen.values() if frame.over and frame.fall_reason]
     expected = [float(row["time_to_fall_s"])] if row["fell"] else []
     return len(falls) == len(expected) and all(map(math.isclose, falls, expected))

@@ -1,4 +1,4 @@
-"""`report.html` of a results folder."""
+"""The file `report.html` of a results folder."""
 
 from __future__ import annotations
 
@@ -32,19 +32,19 @@ _LAST = ("Reference and loop", "Provenance")
 def write_report(
     folder: str | Path, *, pictures: bool = False, videos: bool = False, on_progress: Progress = lambda _: None
 ) -> Path:
-    """Write the report of an evaluation, a frontier or a training into its folder; an interrupted one has one, too.
+    """Write the report of an evaluation, a frontier or a training into its folder, finished or interrupted.
 
     Args:
-        folder: what `evaluate`, `reproduce`, `frontier` or `train` wrote.
-        pictures: of an evaluation: whether to run the shown episodes again for pictures of motion, pushes and falls.
-        videos: likewise, for a video of each scenario (about a megabyte each).
-        on_progress: called with what is being drawn.
+        folder: results folder of `evaluate`, `reproduce`, `frontier` or `train`.
+        pictures: whether to rerun an evaluation's shown episodes for snapshots of motion, pushes and falls.
+        videos: whether to rerun them for a video of each scenario (about a megabyte each).
+        on_progress: called with the figure being drawn.
 
     Returns:
-        The file.
+        The report's file.
 
     Raises:
-        StoreError: if the folder holds nothing to report.
+        StoreError: if the folder has nothing to report.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -73,7 +73,7 @@ def _evaluation(run: Run, album: SnapshotSet) -> str:
     short = said if lone else {scenario: lines[:2] for scenario, lines in said.items()}
     body = [f"<h1>{escape(title)}</h1>", _answer(headline(result, trackings), short)]
     if not result.complete:
-        body.append(paragraph("Interrupted or still running: this holds the episodes that were finished."))
+        body.append(paragraph("Interrupted or still running: the report covers the finished episodes."))
     body.append(_contents([*(["Claims"] if run.claims is not None else []), *result.scenarios, *_LAST]))
     if run.claims is not None:
         body.append(_anchored("Claims", tables.claims(run.claims)))
@@ -84,7 +84,7 @@ def _evaluation(run: Run, album: SnapshotSet) -> str:
 
 
 def _plants(run: Run) -> list[str]:
-    """Return what scenarios share: each robot's loop once, and each of its references once."""
+    """Return the parts common to scenarios: each robot's loop once, and each of its references once."""
     parts: dict[str, list[str]] = {}
     for scenario in run.result.scenarios:
         cell = run.cell(scenario)
@@ -121,7 +121,7 @@ def _episode(run: Run, laws: Laws, scenario: str, episode: Episode) -> list[str]
         if matrix is not None:
             parts.append(signals.lyapunov(episode, tracking, matrix))
         inside = laws.section(scenario)
-    except ValueError as error:  # a controller, a gain or an environment of then that is none any more
+    except ValueError as error:  # a controller, a gain or an environment that no longer exists
         inside = [unavailable(error)]
     figures = figures_of(robot_of(run.cell(scenario)["env_id"]))
     return [*parts, *([] if figures is None else figures.figures(episode)), *inside]
@@ -134,7 +134,7 @@ def _frontier(folder: Path) -> str:
     title = f"Frontier of {found.axis.path} in {wanted['env']}"
     body = [f"<h1>{escape(title)}</h1>", _answer(head, {"": lines})]
     if not found.complete:
-        body.append(paragraph("Interrupted or still running: this holds the levels that were finished."))
+        body.append(paragraph("Interrupted or still running: the report covers the finished levels."))
     body += frontier_page.parts(found)
     body.append(_anchored("Provenance", _origin(record)))
     return page(f"artde-gym: {title}", body)
@@ -170,7 +170,7 @@ def _anchor(title: str) -> str:
 
 
 def _origin(record: Mapping[str, Any]) -> str:
-    """Everything that is needed to run the same again."""
+    """Return everything needed to reproduce the run."""
     origin = record["provenance"]
     facts = {
         "command": origin["command"],

@@ -11,18 +11,18 @@ from artde_gym.report.run import Episode
 
 
 class RobotFigures(Protocol):
-    """The module that `RobotKit.report` names."""
+    """Interface of the module that `RobotKit.report` names."""
 
     def reference(self, kwargs: Mapping[str, Any]) -> Mapping[str, list[str]]:
-        """Return parts of the page, each under a key by which it is shown once, from an environment's arguments."""
+        """Return parts of the page for an environment's arguments; parts with equal keys are shown once."""
         ...
 
     def figures(self, episode: Episode) -> list[str]:
-        """Return figures of one episode under all its controllers."""
+        """Return figures of one episode with all its controllers."""
         ...
 
 
 def figures_of(robot: str) -> RobotFigures | None:
-    """Return what a robot adds; None if it adds nothing."""
+    """Return a robot's figures; None without any."""
     module = ROBOTS[robot].report
     return None if module is None else cast(RobotFigures, importlib.import_module(module))

@@ -1,4 +1,4 @@
-"""A results folder as a report reads it, finished or not."""
+"""A results folder, finished or not, as a report reads it."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ class Run:
     """An evaluation on disk.
 
     Attributes:
-        result: its finished episodes, those of an ablation among them.
-        record: what `summary.json` holds: configuration and provenance.
+        result: its finished episodes, including those of an ablation.
+        record: content of `summary.json`: configuration and provenance.
         claims: the thesis' claims with their verdicts, if they were judged.
-        ablation: scenario -> the run of `reproduce`'s ablation in it, in a folder of its own.
+        ablation: scenario -> the run of `reproduce`'s ablation in it, from a folder of its own.
     """
 
     folder: Path
@@ -49,7 +49,7 @@ class Run:
         """Read an evaluation's folder; a row that is being written is left out.
 
         Raises:
-            StoreError: if it is none.
+            StoreError: if it is not one.
         """
         with wrap_read_errors("results folder", folder, "one that `evaluate` or `frontier` wrote", StoreError):
             record = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
@@ -69,12 +69,12 @@ class Run:
         return cls(folder, Result(episodes, folder, complete), record, judged, ablation)
 
     def gains(self, scenario: str) -> dict[str, Mapping[str, Any]]:
-        """Controller -> gains in place of its preset's."""
+        """Return controller -> gains that override its preset's."""
         own = dict(self.record["configuration"].get("gains", {}))
         return own | (self.ablation[scenario].gains(scenario) if scenario in self.ablation else {})
 
     def cell(self, scenario: str) -> Mapping[str, Any]:
-        """Environment and arguments of a scenario."""
+        """Return environment and arguments of a scenario."""
         return next(cell for cell in self.record["configuration"]["cells"] if cell["name"] == scenario)
 
     @property
@@ -86,7 +86,7 @@ class Run:
         return metrics_spec_of(self.cell(scenario)["env_id"])
 
     def episode(self, scenario: str) -> Episode | None:
-        """The first episode whose signals are stored, of all controllers that have it."""
+        """Return the first episode with stored signals, of all controllers that have it."""
         numbers = sorted({int(i) for name in self.result.controllers for i in self.result.rows(scenario, name).index})
         for number in numbers:
             found = {
@@ -113,11 +113,11 @@ class Run:
 
 @dataclasses.dataclass(frozen=True)
 class Signals:
-    """What one controller did in one episode.
+    """Signals of one controller in one episode.
 
     Attributes:
-        fields: observations by name (samples, size), the policy's inside under "policy.<name>", "time" (samples,).
-        row: of the table of episodes.
+        fields: observations by name (samples, size), the policy's diagnostics under "policy.<name>", "time" (samples,).
+        row: its row in the table of episodes.
     """
 
     fields: Mapping[str, Array]
@@ -132,13 +132,13 @@ class Signals:
         return bool(self.row["fell"])
 
     def inside(self, name: str) -> Array | None:
-        """A diagnostic of the policy (samples, ...), if it has it."""
+        """Return a diagnostic of the policy (samples, ...), if it exists."""
         return self.fields.get(INSIDE + name)
 
 
 @dataclasses.dataclass(frozen=True)
 class Episode:
-    """The same seed under several controllers."""
+    """Episodes of several controllers with the same seed."""
 
     number: int
     signals: Mapping[str, Signals]
@@ -149,12 +149,12 @@ class Episode:
 
     @property
     def end(self) -> float:
-        """The longest of the runs (s)."""
+        """End of the longest run (s)."""
         return max(float(signals.time[-1]) for signals in self.signals.values())
 
     @property
     def disturbances(self) -> dict[str, Any]:
-        """What was drawn, as the grammar writes it."""
+        """Sampled disturbances, in the notation of the grammar."""
         row = next(iter(self.signals.values())).row
         return nested({str(key): value for key, value in row.items() if str(key).startswith("disturbance.")})
 

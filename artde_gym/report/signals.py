@@ -19,15 +19,15 @@ INNER: dict[str, tuple[str, str]] = {
     "sigma": ("|sigma|, error of time-delay estimation", "|sigma| (acceleration)"),
     "s": ("|s|, sliding variable", "|s| (SI)"),
 }
-"""Diagnostic of a law -> head of its chart and label of its axis; "acceleration" is the loop's."""
+"""Diagnostic of a law -> heading of its chart and label of its axis; "acceleration" stands for the loop's unit."""
 LOOPS = {"": "rad/s^2", "_p": "m/s^2", "_q": "rad/s^2"}
 RATES = (("qd_ref", "qd"), ("velocity_ref", "velocity"))
-"""Fields of the rate of the main error, by robot: reference and measured."""
-SETTLED = 0.5  # of a run, after which its largest V is taken as the bound
+"""Fields of the main error's rate, by robot: reference and measured."""
+SETTLED = 0.5  # share of a run after which its largest V is taken as the bound
 
 
 def tracking_error(episode: Episode, tracking: MetricsSpec) -> list[str]:
-    """One figure for each tracked vector, one chart for each of its axes."""
+    """Return one figure per tracked vector, with one chart per axis."""
     shown = styles(episode.signals)
     figures = []
     for tracked in tracking.errors:
@@ -44,13 +44,13 @@ def tracking_error(episode: Episode, tracking: MetricsSpec) -> list[str]:
             charts[axis] = chart.svg()
         caption = f"Tracking error, reference minus measured, episode {episode.number} (seed {episode.seed})."
         caption += " Vertical marks: pushes and drops." if episode.events else ""
-        caption += " A cross: it fell." if any(signals.fell for signals in episode.signals.values()) else ""
+        caption += " A cross marks a fall." if any(signals.fell for signals in episode.signals.values()) else ""
         figures.append(figure(caption, charts, shown))
     return figures
 
 
 def gains(episode: Episode) -> str:
-    """How the laws adapt: their gains, the error of time-delay estimation, the sliding variable."""
+    """Return charts of adaptive gains, time-delay estimation error and sliding variable."""
     charts = {}
     for suffix, acceleration in LOOPS.items():
         for key, (head, label) in INNER.items():
@@ -74,7 +74,7 @@ def gains(episode: Episode) -> str:
 
 
 def lyapunov(episode: Episode, tracking: MetricsSpec, matrix: tuple[str, Array, Array, Array]) -> str:
-    """V = 1/2 xi^T P xi along the run, and the largest value of its second half."""
+    """Return a chart of V = 1/2 xi^T P xi over the run, with the largest value of its second half."""
     owner, p11, p12, p22 = matrix
     shown = styles(episode.signals)
     values = {}
@@ -115,7 +115,7 @@ def over_time(
     zero: bool = False,
     span: tuple[float, float] | None = None,
 ) -> Chart:
-    """A chart over an episode's time, or a part of it, with its events marked."""
+    """Return a chart over an episode's time, or a part of it, with its events marked."""
     y = Axis.of(label, *columns, log=log, zero=zero)
     low, high = span or (0.0, episode.end)
     chart = Chart(f"{name} over time", Axis("time (s)", low, high), y)
@@ -125,7 +125,7 @@ def over_time(
 
 
 def add(chart: Chart, signals: Signals, values: Array, name: str) -> None:
-    """One controller's signal, with a cross where it fell."""
+    """Draw one controller's signal, with a cross at its fall."""
     look = styles([name])[name]
     time = signals.time[: len(values)]
     chart.line(time, values, look, text=name)

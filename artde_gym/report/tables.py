@@ -21,7 +21,7 @@ WIDE = 460
 
 
 def claims(judged: pd.DataFrame) -> str:
-    """The thesis' claims, each with its verdict."""
+    """Return the thesis' claims, each with its verdict."""
     rows = [
         [scenario, Cell(claim, kind="text"), Cell(verdict, kind=VERDICTS.get(verdict, "")), Cell(ours, kind="text"),
          Cell(printed, kind="text")]
@@ -32,7 +32,7 @@ def claims(judged: pd.DataFrame) -> str:
 
 
 def falls(run: Run, scenario: str) -> str:
-    """Falls with Wilson's interval, the time until them, and how the thesis' run ended."""
+    """Return falls with Wilson's interval, the time until them, and the ending of the thesis' run."""
     result, reference = run.result, _reference(scenario)
     rows = []
     for name in result.controllers:
@@ -50,7 +50,7 @@ def falls(run: Run, scenario: str) -> str:
 
 
 def survival(run: Run, scenario: str) -> str:
-    """The share of episodes that has not fallen yet, over time."""
+    """Return a chart of the share of episodes without a fall so far, over time."""
     result = run.result
     shown = styles(result.controllers)
     end = float(result.episodes.loc[result.episodes["scenario"] == scenario, "duration_s"].max())
@@ -70,7 +70,7 @@ def survival(run: Run, scenario: str) -> str:
         y = 100.0 * (1.0 - np.repeat(np.arange(len(times) + 1), 2) / len(rows))
         chart.line(x, y, shown[name], text=name, kind="path")
         chart.marker(end, float(y[-1]), shown[name], f"{name}: {y[-1]:.0f} %")
-    caption = "Survival: the share of episodes in which the robot has not fallen yet."
+    caption = "Survival: the share of episodes without a fall so far."
     printed = thesis.reported(_reference(scenario)).time_to_fall
     for name, time in printed.items():
         if name in shown and time <= end:
@@ -80,7 +80,7 @@ def survival(run: Run, scenario: str) -> str:
 
 
 def metrics(run: Run, scenario: str) -> list[str]:
-    """Every metric by axis and controller; the main one open with a chart, the others folded away."""
+    """Return every metric by axis and controller; the main one open with a chart, the others folded away."""
     entry = SCENARIOS.get(scenario)
     parts = []
     shown = measured(run.tracking(scenario), entry.phases if entry else (), run.registered)
@@ -91,7 +91,7 @@ def metrics(run: Run, scenario: str) -> list[str]:
 
 
 def events(run: Run, scenario: str) -> str:
-    """What follows each push and drop: the peak of the error, and the time until it is back."""
+    """Return peak error and recovery time after each push and drop."""
     result, main = run.result, run.tracking(scenario).errors[0]
     text, digits = UNITS[main.unit]
     peak = f"peak_error_{main.unit}_"
@@ -122,7 +122,7 @@ def events(run: Run, scenario: str) -> str:
         f"peak error ({text})",
         "recovered",
         "median recovery (s)",
-        "unknown, it ended too early",
+        "unknown (ended too early)",
     ]
     return table(f"{scenario}: after pushes and drops (95 % intervals)", columns, rows)
 
@@ -174,7 +174,7 @@ def _printed_change(reference: str | None, metric: str, axis: str, rival: str) -
 
 
 def _dots(run: Run, scenario: str, metric: str, title: str, axes: list[str]) -> str:
-    """Means with their intervals side by side, and the thesis' values as short marks."""
+    """Return a chart of the means with their intervals side by side, and the thesis' values as short marks."""
     result, reference = run.result, _reference(scenario)
     shown, count = styles(result.controllers), len(result.controllers)
     points: list[tuple[float, str, Estimate, float | None]] = []

@@ -1,4 +1,4 @@
-"""The part of a report that shows a training: its tests on held-out episodes, and which policy it kept."""
+"""Report of a training: its tests on held-out episodes, and the policy it kept."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ RECORD, CURVE = "run.json", "learning_curve.csv"
 MILLION = 1e6
 
 SHOWN: dict[str, tuple[str, str, float]] = {
-    "score": ("Score (what is kept is chosen by it)", "score (1)", 1.0),
+    "score": ("Score (selects the policy that is kept)", "score (1)", 1.0),
     "fell": ("Share of episodes with a fall", "falls (%)", 100.0),
     "rmse_m": ("RMS error in space", "RMS error (mm)", 1000.0),
     "duration_s": ("Time until the end or a fall", "time (s)", 1.0),
     "reward": ("Reward of an episode", "reward (1)", 1.0),
     "level": ("Difficulty of the training episodes", "level, 0 to 1 (1)", 1.0),
 }
-"""Column of the tests -> head of its chart, label of its axis, and factor to that unit; any other is shown as it is."""
-SHARES = ("fell", "level")  # drawn from zero on
+"""Column of the tests -> heading of its chart, label of its axis, factor to that unit; other columns as they are."""
+SHARES = ("fell", "level")  # drawn from zero
 
 
 class Trained(NamedTuple):
-    """A run of `train`: its record, its held-out tests in order, and how it names its policy."""
+    """A run of `train`: its record, its held-out tests in order, and the name of its policy."""
 
     record: Mapping[str, Any]
     tests: pd.DataFrame
@@ -45,10 +45,10 @@ class Trained(NamedTuple):
 
 
 def read_training(folder: Path) -> Trained:
-    """A training's folder, finished or not.
+    """Read a training's folder, finished or not.
 
     Raises:
-        StoreError: if it cannot be read, or no test was finished.
+        StoreError: if it is not readable, or has no finished test.
     """
     try:
         record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
@@ -57,16 +57,14 @@ def read_training(folder: Path) -> Trained:
         name = f"{wanted['config']['base']}+{wanted['algo']}"
         tests = tests.astype(float)
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise StoreError(
-            "training", str(folder), "a folder of `train` in which a held-out test was finished"
-        ) from error
+        raise StoreError("training", str(folder), "a folder of `train` with a finished held-out test") from error
     if tests.empty:
-        raise StoreError("training", str(folder), "a folder of `train` in which a held-out test was finished")
+        raise StoreError("training", str(folder), "a folder of `train` with a finished held-out test")
     return Trained(record, tests, name)
 
 
 def answer(run: Trained) -> tuple[str, list[str]]:
-    """What came of it."""
+    """Return a headline, and sentences on the first, best and last tests."""
     tests, best = run.tests, run.best
     rows: list[dict[Any, Any]] = tests.to_dict(orient="records")
     first, kept, last = rows[0], rows[best], rows[-1]
@@ -80,18 +78,18 @@ def answer(run: Trained) -> tuple[str, list[str]]:
             lines.append(f"{what}: {' in the first test, '.join(values)} in the best.")
     if best < len(rows) - 1:
         lines.append(
-            f"Tests since that were no better: {len(rows) - 1 - best}, the last one {last['score']:.4g}; "
-            "the policy of the best one is kept."
+            f"Later tests without improvement: {len(rows) - 1 - best}, the last one {last['score']:.4g}; "
+            "the policy of the best test is kept."
         )
     lines.append(
-        "Scores are means over the same held-out episodes each time, and the best of several is a little flattered: "
-        "compare the policy with its base by `evaluate`, on other seeds."
+        "Scores are means over the same held-out episodes each time; the best of several is biased upward: "
+        "compare the policy with its base by `evaluate` on other seeds."
     )
     return head, lines
 
 
 def parts(run: Trained) -> list[str]:
-    """Charts of every number that the tests have, and all of them as a table."""
+    """Return charts of all numbers of the tests, and a table of them."""
     tests, shown = run.tests, styles([run.name])
     look = shown[run.name]
     steps = tests["steps"].to_numpy(dtype=float) / MILLION

@@ -1,7 +1,7 @@
-"""Studies on top of the evaluation: each one many evaluations, with a design, a store and an answer of its own.
+"""Studies built on evaluations, each with a design, a store and a result of its own.
 
 `reproduce` judges the thesis' claims, `frontier` finds the largest disturbance that a controller survives, `tune` gives
-every controller the same budget of trials, and `sweep` runs a grid or a random sample of cases.
+every controller the same number of trials, and `sweep` runs a grid or a random sample of cases.
 """
 
 from artde_gym.studies.frontier import Frontier, frontier

@@ -1,4 +1,4 @@
-"""Episodes to look at: pictures and videos of exactly what `evaluate` runs."""
+"""Images and videos of the episodes that `evaluate` runs."""
 
 from artde_gym.video.recording import video
 

@@ -1,4 +1,4 @@
-"""Pictures of one episode as it goes on."""
+"""Frames of one episode."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from artde_gym.registration import ControllerSpec
 
 
 class Frame(NamedTuple):
-    """A picture (height, width, 3) at a time; whether the episode ended there, and why if in a fall ("" if not)."""
+    """A frame (height, width, 3) at a time; `over` at the episode's end, with the reason of a fall ("" without one)."""
 
     time_s: float
     picture: NDArray[np.uint8]
@@ -33,19 +33,19 @@ def render_frames(
     times: Iterable[float],
     width: int,
 ) -> Iterator[Frame]:
-    """Run one episode in an environment of its own, with a picture at the first sample at or after each time (s).
+    """Run one episode in a separate environment, with a frame at the first sample at or after each time (s).
 
-    The last picture is that of the episode's end, if it comes before the last time.
+    The last frame is at the episode's end, if that comes before the last time.
 
     Args:
-        env_id, kwargs: of the environment.
-        policy, gains: what drives it.
-        seed: of the reset: of an episode of `evaluate`, that very episode is shown.
-        times: ascending.
-        width: of the pictures (pixels), whose height is three quarters of it.
+        env_id, kwargs: environment and its arguments.
+        policy, gains: the controller and its gains.
+        seed: of the reset; the seed of an episode of `evaluate` shows that very episode.
+        times: in ascending order.
+        width: of the frames (pixels), whose height is three quarters of it.
 
     Raises:
-        OptionError: for a bad argument, or where an engine cannot draw.
+        OptionError: for an invalid argument, or an engine that cannot render.
     """
     env = drawing(env_id, kwargs, width)
     try:

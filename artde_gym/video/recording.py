@@ -1,4 +1,4 @@
-"""A video of one episode, of one controller or of several on the same seed."""
+"""Video of one episode, of one controller or of several on the same seed."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from artde_gym.video import writer
 from artde_gym.video.frames import Frame, render_frames
 from artde_gym.video.tiles import tile_frames
 
-SPEEDS = (0.001, 1000.0)
-"""Slowest and fastest, shown over simulated time."""
-MOST = 20_000  # pictures: eleven minutes at thirty a second
-EARLY = 1e-9  # s, that a sample may lie before its time
-HELD = 1.0  # s, for which the last picture is shown after everybody has ended
+SPEED_RANGE = (0.001, 1000.0)
+"""Lowest and highest speed, as shown over simulated time."""
+MAX_FRAMES = 20_000  # frames: eleven minutes at thirty per second
+TIME_TOLERANCE_S = 1e-9  # by which a sample may precede its time
+END_HOLD_S = 1.0  # for which the last frame is shown after all have ended
 
 
 def video(
@@ -50,30 +50,30 @@ def video(
     gains: Mapping[str, Mapping[str, Any]] | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> Path:
-    """Show an episode as `evaluate` runs it with the same arguments, side by side for several controllers.
+    """Record an episode as `evaluate` runs it with the same arguments; several controllers side by side.
 
-    Who falls stays in the picture as it fell, with the time.
+    A robot that falls stays in the frame as it fell, with the time.
 
     Args:
-        controllers, env_id, scenario, disturbances, env_kwargs, gains: as of `evaluate`.
-        out: .mp4 or .webm (which need ffmpeg), .gif, .webp, or .png for one picture, that at `start`.
-        seed, episode: which one of an evaluation's episodes.
-        start, end: part that is shown (s); the simulation begins at 0 nevertheless.
-        speed: 0.5 shows it half as fast.
-        fps: pictures a second of the video; 50 at most in a GIF and 90 in a WebP, as browsers slow down faster ones.
-        width: of one controller's panel (pixels), whose height is three quarters of it.
-        columns: tiles in a row; None for all of them.
-        on_progress: called with the simulated time (s) of each picture.
+        controllers, env_id, scenario, disturbances, env_kwargs, gains: as for `evaluate`.
+        out: .mp4 or .webm (which need ffmpeg), .gif, .webp, or .png for a single frame at `start`.
+        seed, episode: base seed and number of an evaluation's episode.
+        start, end: part to show (s); the simulation always begins at 0.
+        speed: 0.5 is half speed.
+        fps: frames per second; 50 at most in a GIF and 90 in a WebP, since browsers slow down faster ones.
+        width: of one controller's tile (pixels), whose height is three quarters of it.
+        columns: tiles per row; None for all in one row.
+        on_progress: called with the simulated time (s) of each frame.
 
     Returns:
-        The file.
+        The video's file.
 
     Raises:
-        UnknownNameError, OptionError, DisturbanceError, GainError: for a bad argument, also where an engine cannot draw
-            or ffmpeg is missing.
+        UnknownNameError, OptionError, DisturbanceError, GainError: for an invalid argument, also if an engine cannot
+            render or ffmpeg is missing.
     """
     out = Path(out)
-    speed = check_number("speed", speed, *SPEEDS, "a number from {:g} to {:g}".format(*SPEEDS))
+    speed = check_number("speed", speed, *SPEED_RANGE, "a number from {:g} to {:g}".format(*SPEED_RANGE))
     start = check_number("start", start, 0.0, sys.float_info.max, "a finite number >= 0 (s)")
     end = check_number("end", end, math.nextafter(start, math.inf), math.inf, f"a number > the start, {start:g} (s)")
     columns = None if columns is None else check_integer("columns", columns, 1)
@@ -102,9 +102,9 @@ def video(
     title += f"; seed {seed}, episode {episode}" + ("" if speed == 1 else f"; {speed:g} x speed")
 
     def pictures() -> Iterator[NDArray[np.uint8]]:
-        for shown in _together(videos, held=math.ceil(HELD * fps)):
+        for shown in _together(videos, held=math.ceil(END_HOLD_S * fps)):
             reached = max(frame.time_s for frame in shown.values())
-            if reached < start - EARLY:  # nobody is there any more
+            if reached < start - TIME_TOLERANCE_S:  # all episodes have ended
                 raise OptionError("start", start, f"up to the end of the episode, {reached:g} s")
             if on_progress is not None:
                 on_progress(reached)
@@ -115,14 +115,16 @@ def video(
 
 
 def _check_part(out: Path, cell: Cell, start: float, end: float, step: float) -> None:
-    """See that the part to be shown begins within the episode, and that its pictures are not too many."""
+    """Check that the part to show begins within the episode, and that it has not too many frames."""
     validate_cell(False, cell)
     duration = cell.kwargs.get("duration", arguments_of(cell.env_id)["duration"].default)
     if start > duration:
         raise OptionError("start", start, f"up to the end of the episode, {duration:g} s")
     count = math.ceil((min(end, duration) - start) / step)
-    if out.suffix != ".png" and count > MOST:
-        raise OptionError("number of pictures", count, f"at most {MOST}: a shorter part, less slow, or fewer a second")
+    if out.suffix != ".png" and count > MAX_FRAMES:
+        raise OptionError(
+            "number of pictures", count, f"at most {MAX_FRAMES}: shorten the part, raise the speed or lower the fps"
+        )
 
 
 def _times(start: float, end: float, step: float) -> Iterator[float]:
@@ -130,7 +132,7 @@ def _times(start: float, end: float, step: float) -> Iterator[float]:
 
 
 def _together(videos: Mapping[str, Iterator[Frame]], held: int) -> Iterator[dict[str, Frame]]:
-    """Instant by instant what each video shows, its last picture after its end; `held` more in the very end."""
+    """Yield all videos' frames at each instant, the last one after an episode's end; `held` more at the end."""
     shown: dict[str, Frame] = {}
     while True:
         fresh = {name: frame for name, video in videos.items() if (frame := next(video, None)) is not None}

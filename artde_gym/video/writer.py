@@ -1,4 +1,4 @@
-"""Moving pictures as files: MP4 and WebM through ffmpeg, GIF and WebP without."""
+"""Video files: MP4 and WebM through ffmpeg, GIF and WebP without it."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ CODECS: dict[str, list[str]] = {
 }
 SUFFIXES = (*CODECS, ".gif", ".webp", ".png")
 UNITS = {".gif": 100, ".webp": 1000}
-"""Suffix -> parts of a second in which its files count the time that a picture is shown."""
-FASTEST = {".gif": 50.0, ".webp": 90.0}
-"""Suffix -> most pictures a second: browsers show what is shorter than 2 and 11 units for a tenth of a second."""
+"""Suffix -> units per second in which the files count the duration of a frame."""
+MAX_FPS = {".gif": 50.0, ".webp": 90.0}
+"""Suffix -> most frames per second: browsers show frames shorter than 2 and 11 units for a tenth of a second."""
 RATES = (0.01, 1000.0)
-"""Slowest and fastest that can be asked for, pictures a second."""
-COLORS = 192  # of a GIF
-SAMPLED = 12  # pictures that a GIF's palette is made of
-QUALITY = 75  # of a WebP
+"""Lowest and highest frame rate (frames per second)."""
+GIF_COLORS = 192
+GIF_PALETTE_FRAMES = 12  # frames from which a GIF's palette is computed
+WEBP_QUALITY = 75
 
 
 def check(out: Path) -> None:
-    """See that a file can be made.
+    """Check that a file can be made.
 
     Raises:
         OptionError: for a suffix that nothing is known for, or ffmpeg that is missing.
@@ -49,27 +49,27 @@ def check(out: Path) -> None:
 
 
 def frame_rate(out: Path, fps: float) -> float:
-    """The closest rate that a file can have: MP4 and WebM are told it in hundredths, GIF and WebP have a fastest one.
+    """Return the closest supported frame rate: MP4 and WebM take hundredths, GIF and WebP have a highest rate.
 
     Raises:
-        OptionError: for one that is not within `RATES`.
+        OptionError: for a rate outside `RATES`.
     """
     slowest, fastest = RATES
     given = check_number("fps", fps, slowest, fastest, f"a number from {slowest:g} to {fastest:g}")
-    return round(given, 2) if out.suffix in CODECS else min(given, FASTEST.get(out.suffix, fastest))
+    return round(given, 2) if out.suffix in CODECS else min(given, MAX_FPS.get(out.suffix, fastest))
 
 
 def durations(count: int, fps: float, units: int) -> list[int]:
-    """How long each picture is shown, in whole parts of a second of which there are `units`, as (count,) numbers.
+    """Return the duration of each frame, in units of which a second has `units`, as (count,) numbers.
 
-    What one is rounded by, the next one makes up for: each begins within half a part of its time.
+    Rounding errors do not accumulate: each frame begins within half a unit of its time.
     """
     ends = (round(i * units / fps) for i in range(count + 1))
     return [end - start for start, end in itertools.pairwise(ends)]
 
 
 def write(out: Path, pictures: Iterator[Picture], fps: float) -> None:
-    """Write pictures of one size as a file, whole or not at all; PNG takes the first one.
+    """Write frames of one size to a file, completely or not at all; PNG takes the first one.
 
     Raises:
         OptionError, StoreError: as of `check`.
@@ -105,19 +105,21 @@ def _encode(out: Path, pictures: Iterator[Picture], fps: float) -> None:
 
 
 def _gif(out: Path, pictures: Iterator[Picture], fps: float) -> None:
-    """With one palette for all pictures, so that still parts stay still: rare colors of any of them are in it."""
+    """Write a GIF with one palette for all frames, rare colors included, so that still parts stay still."""
     frames = [Image.fromarray(picture) for picture in pictures]
-    sample = np.concatenate([np.asarray(frame) for frame in frames[:: -(-len(frames) // SAMPLED)] + frames[-1:]])
-    palette = Image.fromarray(sample).quantize(COLORS, Image.Quantize.MAXCOVERAGE)
+    sample = np.concatenate(
+        [np.asarray(frame) for frame in frames[:: -(-len(frames) // GIF_PALETTE_FRAMES)] + frames[-1:]]
+    )
+    palette = Image.fromarray(sample).quantize(GIF_COLORS, Image.Quantize.MAXCOVERAGE)
     _animate(out, [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames], fps, optimize=True)
 
 
 def _webp(out: Path, pictures: Iterator[Picture], fps: float) -> None:
-    _animate(out, [Image.fromarray(picture) for picture in pictures], fps, quality=QUALITY, method=4)
+    _animate(out, [Image.fromarray(picture) for picture in pictures], fps, quality=WEBP_QUALITY, method=4)
 
 
 def _animate(out: Path, frames: list[Image.Image], fps: float, **options: Any) -> None:
-    """Save frames that are shown for ever again; Pillow takes milliseconds for both formats."""
+    """Save frames as an endless loop; Pillow takes milliseconds for both formats."""
     units = UNITS[out.suffix]
     shown = [1000 // units * duration for duration in durations(len(frames), fps, units)]
     first, *rest = frames
@@ -129,12 +131,12 @@ def _png(out: Path, pictures: Iterator[Picture], _fps: float) -> None:
 
 
 def _ffmpeg(out: Path) -> Any:
-    """The library that brings ffmpeg."""
+    """Import the library that provides ffmpeg."""
     try:
         import imageio_ffmpeg
 
         imageio_ffmpeg.get_ffmpeg_exe()
     except (ImportError, RuntimeError) as error:
-        allowed = ".gif, .webp or .png, or any video after: pip install 'artde-gym[video]' (it brings ffmpeg)"
+        allowed = ".gif, .webp or .png, or install ffmpeg for other videos: pip install 'artde-gym[video]'"
         raise OptionError("out", str(out), allowed) from error
     return imageio_ffmpeg

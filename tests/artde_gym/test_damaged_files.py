@@ -54,7 +54,7 @@ seed: 3
 episodes: 2
 gains: {tde: {k_p_p: 8.0}}
 disturbances:
-  payload: {mass: 0.2, drop: 0.1}
+  payload: {mass: 0.2, detach_time: 0.1}
 env_kwargs: {engine: mujoco, duration: 0.1}
 grid:
   controller: [tde, artde]
@@ -139,8 +139,8 @@ def test_a_table_of_something_else_is_not_gone_on_with(tmp_path: Path) -> None:
     lines = good.splitlines(keepends=True)
     for bad, words in (
         (good.replace(",artde", ",pid").replace("artde,", "pid,"), "controller 'pid'"),
-        (good + lines[-1], "an episode twice"),
-        (good.replace("False", "perhaps", 1), "fell is no column of its kind"),
+        (good + lines[-1], "a duplicate episode"),
+        (good.replace("False", "perhaps", 1), "column fell has values of another kind"),
     ):
         table.write_text(bad)
         with pytest.raises(StoreError, match=words):

@@ -117,7 +117,7 @@ def test_an_identity_is_text():
 def test_a_policy_that_cannot_be_pickled_runs_in_one_process_and_is_refused_for_several(tmp_path):
     policy = Lift(14.0, hook=lambda: 1)
     assert run(policy, tmp_path / "run") == 1
-    with pytest.raises(OptionError, match=r"controller 'mine'.*can be pickled.*workers=1"):
+    with pytest.raises(OptionError, match=r"controller 'mine'.*picklable.*workers=1"):
         run(policy, None, workers=2)
 
 
@@ -129,7 +129,7 @@ def test_a_registered_controller_that_cannot_be_pickled_is_refused_for_several_p
         lambda: evaluate(["lift"], QUADROTOR, workers=2, out=tmp_path / "run"),
         lambda: sweep(given, tmp_path / "run", workers=2),
     ):
-        with pytest.raises(OptionError, match=r"controller 'lift'.*can be pickled.*workers=1"):
+        with pytest.raises(OptionError, match=r"controller 'lift'.*picklable.*workers=1"):
             go()
     assert not (tmp_path / "run").exists()
     assert evaluate(["lift"], QUADROTOR, episodes=1, env_kwargs={"duration": 0.15}, out=tmp_path / "run").complete
@@ -173,7 +173,7 @@ def test_gains_that_json_cannot_write_are_refused_with_a_folder(tmp_path, monkey
     artde_gym.register_controller("lift", f"{__name__}:make_lift")
     given: dict[str, Any] = {"gains": {"lift": {"hook": len}}, "env_kwargs": {"duration": 0.15}, "episodes": 1}
     assert evaluate(["lift"], QUADROTOR, **given).complete
-    with pytest.raises(OptionError, match=r"gains is .*JSON can write"):
+    with pytest.raises(OptionError, match=r"gains is .*JSON can store"):
         evaluate(["lift"], QUADROTOR, out=tmp_path / "run", **given)
     assert not (tmp_path / "run").exists()
 

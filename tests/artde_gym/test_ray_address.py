@@ -42,8 +42,8 @@ HTTP_2 = b"\0\0\0\x04" + b"\0" * 5  # empty settings, and nothing after them
 @pytest.fixture
 def answering(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     """A server that answers every client with the same bytes, or takes what it says and is silent."""
-    monkeypatch.setattr(ray_workers, "ANSWER", 0.3)
-    monkeypatch.setattr(ray_workers, "JOINED", 3.0)
+    monkeypatch.setattr(ray_workers, "ANSWER_TIMEOUT_S", 0.3)
+    monkeypatch.setattr(ray_workers, "JOIN_TIMEOUT_S", 3.0)
     servers: list[socket.socket] = []
     clients: list[socket.socket] = []
 
@@ -74,5 +74,5 @@ def answering(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
 
 @pytest.mark.parametrize("answer", [b"", b"HTTP/1.1 400 Bad Request\r\n\r\n", b"SSH-2.0-OpenSSH\r\n", HTTP_2])
 def test_somebody_else_at_the_address_is_no_cluster(answer: bytes, answering: Any, tmp_path: Path) -> None:
-    with pytest.raises(OptionError, match="running Ray cluster, which answers within 20 s"):
+    with pytest.raises(OptionError, match="Ray cluster that answers within 20 s"):
         sweep(SMALL, tmp_path / "run", executor="ray", address=answering(answer))

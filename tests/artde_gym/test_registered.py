@@ -133,7 +133,7 @@ def test_a_metric_is_in_summary_comparison_and_report(runs):
 
 def test_a_worker_that_lacks_a_metric_says_so(tmp_path):
     ended = run_script(tmp_path, BELOW, tmp_path / "out")
-    assert "register it where the script is imported" in ended.stderr
+    assert "register it at import" in ended.stderr
 
 
 def test_metrics_are_those_of_the_whole_signal_in_single_and_batch(tmp_path):

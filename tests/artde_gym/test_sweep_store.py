@@ -224,7 +224,7 @@ def test_a_corrupt_part_is_set_aside_and_its_episodes_run_again(tmp_path, whole,
     path.write_bytes(harmed)
     if harm not in ("copied", "foreign"):
         assert harmed != data
-        with pytest.raises(StoreError, match="as it was written"):
+        with pytest.raises(StoreError, match="an intact file"):
             read_sweep(folder)
     with SweepStore(folder) as store:
         assert [one.name for one in store.set_aside] == [path.name]
@@ -258,7 +258,7 @@ def test_other_folders_are_left_alone(tmp_path):
         with pytest.raises(StoreError):
             stored(folder, FIRST)
         assert [path.name for path in folder.iterdir()] == ["sweep.json"]
-    with pytest.raises(StoreError, match="something else"):
+    with pytest.raises(StoreError, match="other files"):
         stored(tmp_path / "mine", FIRST)
     with pytest.raises(StoreError, match=r"sweep\.json"):
         read_sweep(tmp_path / "mine")
@@ -314,7 +314,7 @@ def test_of_sweeps_that_begin_together_one_runs_and_the_others_say_so(tmp_path):
     assert outcome.returncode == 0, outcome.stderr
     lines = outcome.stdout.splitlines()
     assert len(lines) == 20
-    assert all("a folder that nobody else writes; process" in line for line in lines)
+    assert all("a folder without another writer; in use by process" in line for line in lines)
 
 
 def test_every_run_leaves_its_provenance(tmp_path, whole):
@@ -348,7 +348,7 @@ def test_a_file_that_cannot_grow_is_an_error_of_ours_and_the_folder_goes_on(tmp_
     arguments = [sys.executable, "-c", FILL, str(Path(__file__).parent), str(folder)]
     outcome = subprocess.run(arguments, capture_output=True, text=True, timeout=60, check=True)
     assert "File too large" in outcome.stdout
-    assert "the same command continues" in outcome.stdout
+    assert "re-run the command to resume" in outcome.stdout
     assert len(read_sweep(folder)) == 2
     pd.testing.assert_frame_equal(stored(folder, FIRST, SECOND), whole, check_exact=True)
 
@@ -375,7 +375,7 @@ def test_a_full_disk_is_an_error_of_ours_and_the_folder_goes_on(small_disk, whol
     ballast = small_disk / "ballast"
     stored(small_disk / "run", FIRST)
     fill(ballast)
-    with pytest.raises(StoreError, match=r"No space left.*the same command continues"):
+    with pytest.raises(StoreError, match=r"No space left.*re-run the command to resume"):
         stored(small_disk / "run", FIRST, SECOND)
     assert len(read_sweep(small_disk / "run")) == 2
     ballast.unlink()

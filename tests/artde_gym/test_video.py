@@ -24,7 +24,7 @@ from artde_gym.palette import STYLES
 from artde_gym.registration import registered_controllers
 from artde_gym.video import video
 from artde_gym.video.frames import Frame, render_frames
-from artde_gym.video.tiles import FALLEN, tile_frames
+from artde_gym.video.tiles import FALLEN_RGB, tile_frames
 from artde_gym.video.writer import durations, frame_rate, write
 
 WALK, FLYER = "BipedWalk-Payload-v0", "QuadInfinity-Payload-v0"
@@ -88,8 +88,8 @@ def test_two_controllers_side_by_side_with_their_fall(tmp_path: Path, suffix: st
         part = np.s_[20:42, number * 164 : number * 164 + 80]
         assert near(first[part], STYLES[name].color, 60).sum() > 10
         panel = np.s_[45:, number * 164 : number * 164 + 160]
-        assert near(last[panel], FALLEN).sum() > 300  # its frame
-        assert not near(first[panel], FALLEN).sum() > 10
+        assert near(last[panel], FALLEN_RGB).sum() > 300  # its frame
+        assert not near(first[panel], FALLEN_RGB).sum() > 10
     assert not np.array_equal(first, film[3])
 
 
@@ -126,7 +126,7 @@ def test_panels_freeze_who_has_ended_and_fill_rows() -> None:
     panel = page[20 + 20 :][:60, :80]
     middle = panel[30, 40].astype(int)
     assert middle.max() - middle.min() < 80 < 180  # paler than it was
-    assert near(panel[:2], FALLEN).all()
+    assert near(panel[:2], FALLEN_RGB).all()
     assert (page[-62:-4, 84:] > 250).all()  # the fourth place is free
 
 

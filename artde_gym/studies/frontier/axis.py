@@ -1,4 +1,4 @@
-"""What a frontier varies: a path to one number, its range and its grid."""
+"""The axis of a frontier: the path of the varied number, its range and its grid."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from artde_gym.evaluation.environments import PICTURES, arguments_of, robot_of
 from artde_gym.kit import Harder
 from artde_gym.studies.frontier.standard import standard_for
 
-FINEST = 1e-6  # tolerance relative to the ends; finer steps would drown in the digits of a level's name
+FINEST = 1e-6  # tolerance relative to the ends; finer steps exceed the digits of a level's name
 
 
 GAINS = "gains"
@@ -47,7 +47,7 @@ class Axis:
 
     @property
     def levels(self) -> list[float]:
-        """The grid, the easiest level first; its last step may be shorter than the others."""
+        """The grid, easiest level first; its last step may be shorter than the others."""
         count = math.ceil((self.high - self.low) / self.tolerance - FINEST)
         start, step = (self.low, self.tolerance) if self.harder == "larger" else (self.high, -self.tolerance)
         end = self.high if self.harder == "larger" else self.low
@@ -56,7 +56,7 @@ class Axis:
     def place(
         self, value: float, disturbances: Mapping[str, Any], arguments: Mapping[str, Any]
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Disturbances and arguments of the environment with `value` in its place, the given ones left alone.
+        """Return disturbances and environment arguments with `value` at the axis; the given ones are not changed.
 
         A gain has no place among them.
 
@@ -71,7 +71,7 @@ class Axis:
 
 
 def placed(disturbances: Mapping[str, Any], kind: str, name: str, value: Any) -> dict[str, Any]:
-    """Disturbances with `value` for one parameter of a kind, in all its entries; the given ones are left alone.
+    """Return disturbances with `value` for one parameter of a kind, in all its entries; the given ones are not changed.
 
     Raises:
         OptionError: for a kind that takes a list, if none is given.
@@ -81,7 +81,7 @@ def placed(disturbances: Mapping[str, Any], kind: str, name: str, value: Any) ->
         return {**disturbances, kind: {**parameters_of(kind, given), name: value}}
     entries = [given] if isinstance(given, Mapping) else given
     if not (isinstance(entries, (list, tuple)) and entries and all(isinstance(entry, Mapping) for entry in entries)):
-        raise OptionError("disturbances", given, f"with a list of at least one {kind!r}: it is varied")
+        raise OptionError("disturbances", given, f"with a list of at least one {kind!r} to vary")
     return {**disturbances, kind: [{**entry, name: value} for entry in entries]}
 
 
@@ -97,7 +97,7 @@ def axis(
 
     Raises:
         UnknownNameError: if there is no number at this path.
-        OptionError: for a range that is missing, empty, off the grid of whole numbers, or not allowed.
+        OptionError: for a range that is missing, empty, invalid, or off the grid of whole numbers.
     """
     if current_path(path) != path:
         warn(f"path {path!r}", repr(current_path(path)))

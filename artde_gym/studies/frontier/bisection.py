@@ -1,4 +1,4 @@
-"""Bisection of several controllers in step, on levels by number."""
+"""Bisection for several controllers in lockstep, on numbered levels."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ def search(
 ) -> dict[str, dict[int, bool]]:
     """Bisect for each name on the levels 0 (easiest) to size - 1 (hardest), size >= 2.
 
-    All searches go on in step. As a level can come up at one depth of a bisection only, all that need it ask for it at
-    the same time: `run(level, names)`, which returns whether each of them survived, is called at most once a level.
+    All searches advance in lockstep. A level can come up at only one depth of a bisection, so all searches that need it
+    ask for it at the same time: `run(level, names)`, which returns the survivors, is called at most once per level.
     """
     outcomes: dict[str, dict[int, bool]] = {name: {} for name in names}
     while True:
@@ -31,7 +31,7 @@ def search(
 
 
 def bracket(outcomes: Outcomes) -> tuple[int | None, int | None]:
-    """Hardest level survived and easiest one failed, None where there is none: a bisection keeps the first below."""
+    """Return the hardest level survived and the easiest failed, or None; bisection keeps the first lower."""
     return (
         max((level for level, survived in outcomes.items() if survived), default=None),
         min((level for level, survived in outcomes.items() if not survived), default=None),

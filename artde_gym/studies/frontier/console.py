@@ -28,14 +28,14 @@ def print_frontier(found: Frontier, console: Console) -> None:
         note = (
             f"{most} value at which at least {wanted} of {count} seeded episodes end without a fall, on a grid of "
             f"{_value(axis.tolerance, axis.unit)} from {axis.low:g} to {_value(axis.high, axis.unit)}; the intervals "
-            "say how far the true rates may be from the observed ones"
+            "cover the uncertainty of the true rates"
         )
         console.print(Text(note, style="dim"))
         console.print(_table(found))
         if found.half is not None:
             _print_grid(found, console)
     if not found.complete:
-        console.print("Interrupted: the same command continues; finished episodes are kept.")
+        console.print("Interrupted; finished episodes are kept. Re-run the command to resume.")
     if found.folder is not None:
         console.print(f"Written to {found.folder}")
 

@@ -1,4 +1,4 @@
-"""The design of a frontier: the test that all levels have in common, and the number that is varied in it."""
+"""The design of a frontier: the test common to all levels, and the number varied in it."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class Design:
     """A test in which one number is varied.
 
     Attributes:
-        axis: what is varied.
-        survival: share of episodes without a fall that a level takes to count as survived.
+        axis: the varied number.
+        survival: share of episodes without a fall at which a level counts as survived.
         disturbances: of the test.
         arguments: of its environment.
     """
@@ -50,7 +50,7 @@ class Design:
         design = cls(axis, survival, disturbances, arguments)
         for end in (axis.levels[0], axis.levels[-1]):
             placed = design.at(end, cell)
-            if axis.kind is None:  # nothing here knows the argument's range: let the environment refuse it at once
+            if axis.kind is None:  # only the environment knows the argument's range: let it check at once
                 validate_cell(plan.vectorized, placed)
         return design
 

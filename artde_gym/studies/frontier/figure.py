@@ -1,4 +1,4 @@
-"""A frontier as a picture: survival against the varied value, and how far each controller gets."""
+"""Figure of a frontier: survival against the varied value, and each controller's margin."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ GRAY = "#555555"
 
 
 def draw(found: Frontier, file: BinaryIO) -> None:
-    """Write a PNG. Above: survival with Wilson's 95 % bars. Below: what each controller survives, its bracket pale."""
+    """Write a PNG. Above: survival with Wilson's 95 % bars. Below: survived ranges, with brackets pale."""
     rows: list[dict[Any, Any]] = found.table.to_dict(orient="records")
     levels: list[dict[Any, Any]] = found.levels.to_dict(orient="records")
     shown = styles(str(row["controller"]) for row in rows)
@@ -81,7 +81,7 @@ def _finish_upper(axes: Any, found: Frontier, count: int) -> None:
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
     episodes = "1 seeded episode" if count == 1 else f"{count} seeded episodes"
-    note = f"{episodes} a level and controller; bars: 95 % interval; markers side by side are one level"
+    note = f"{episodes} per level and controller; bars: 95 % interval; markers side by side are one level"
     axes.set_title(note, fontsize=8.5, color=GRAY, loc="left")
 
 

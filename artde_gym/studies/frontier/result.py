@@ -16,18 +16,18 @@ RECORD = "frontier.json"
 
 @dataclasses.dataclass(frozen=True)
 class Frontier:
-    """What a frontier found.
+    """The result of a frontier.
 
     Attributes:
-        table: one row a controller. `relation` and `frontier` are to be read together: "=" the hardest value survived,
-            ">=" (or "<=" where smaller is harder) the end of the range was survived too, "<" (">") not even the easy
-            end was survived, "" not found yet. `low`, `high`: the bracket, adjacent tested values around the crossing,
-            NaN beyond the range; `low_rate`, `low_rate_from`, `low_rate_to`: survival at `low` with its 95 % interval,
-            likewise at `high`.
-        levels: one row a tested value and controller; `rate` with its 95 % interval `low`, `high`.
-        axis: what was varied.
-        survival: share of episodes to be survived.
-        folder: where everything is stored, if it is.
+        table: one row per controller. Read `relation` and `frontier` together: "=" is the hardest value survived, ">="
+            (or "<=" where smaller is harder) means the end of the range was survived too, "<" (">") that not even the
+            easy end was survived, "" not found yet. `low`, `high`: the bracket, adjacent tested values around the
+            crossing, NaN beyond the range; `low_rate`, `low_rate_from`, `low_rate_to`: survival at `low` with its 95 %
+            interval; the same for `high`.
+        levels: one row per tested value and controller; `rate` with its 95 % interval `low`, `high`.
+        axis: the varied number.
+        survival: share of episodes at which a level counts as survived.
+        folder: the results folder, if they are stored.
         complete: False if the search was interrupted.
         half: of a grid, one row a controller: the value at which `half` of the episodes are survived with its 95 %
             interval `low`, `high`, over so many `episodes` a level; see `artde_gym.studies.frontier.half`.
@@ -45,7 +45,7 @@ class Frontier:
 
 
 def value_text(row: Mapping[Any, Any], unit: str) -> str:
-    """A row's frontier with its relation and unit, e.g. ">= 60 N", or "open" if it was not found yet."""
+    """Format a row's frontier with its relation and unit, e.g. ">= 60 N", or "open" if it was not found yet."""
     if not row["relation"]:
         return "open"
     relation = "" if row["relation"] == "=" else f"{row['relation']} "

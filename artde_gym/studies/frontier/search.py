@@ -1,11 +1,11 @@
-"""The robustness frontier: how much of one disturbance each controller survives.
+"""The robustness frontier: the largest disturbance that each controller survives.
 
-The standard test, the same for all controllers and used where no disturbances are given, is a walk of Ojas of 12 s in
-scenario S2, or a flight of the Q450 of 20 s in scenario Q1 (its payload is not dropped before the end), with what is
-varied set to its value. Where a push is varied, there is one push for 0.2 s on the chest, or the vehicle, in place of
-the scenario's own, from any side with equal probability, at a time drawn uniformly from one stride of steady walking (5
-to 7 s) or half a loop at full speed (6 to 16 s): a robot is easier to topple in some phases than in others, and nobody
-chooses when he is pushed. Where a rotor's loss is varied, it is the front left one's, from such a time on.
+The standard test, the same for all controllers and the default for disturbances, is a walk of Ojas of 12 s in scenario
+S2, or a flight of the Q450 of 20 s in scenario Q1 (its payload is not dropped before the end), with the varied number
+set to its value. If a push is varied, one push for 0.2 s on the chest, or the vehicle, replaces the scenario's own. It
+comes from any side with equal probability, at a time drawn uniformly from one stride of steady walking (5 to 7 s) or
+half a loop at full speed (6 to 16 s), since a robot is easier to topple in some phases than in others. If a rotor's
+loss is varied, it is the front left rotor's, from such a time on.
 
 A level counts as survived if the *observed* share of episodes without a fall is at least `survival`. The bracket holds
 the point where the observed share crosses it, for these seeds. What n episodes say about the true share is Wilson's
@@ -18,8 +18,8 @@ controller run side by side. There is then a half point for each controller, see
 
 The ground force of the thesis is a grid of its own: `vary="grf_pulse.magnitude", grid=True` in scenario S1 or S2.
 
-    frontier.csv     one row a controller
-    levels.csv       one row a tested level and controller
+    frontier.csv     one row per controller
+    levels.csv       one row per tested level and controller
     frontier.png     survival against the varied value
     half.csv         one row a controller, of a grid
     frontier.json    configuration and provenance, written before the first episode
@@ -56,7 +56,7 @@ from artde_gym.studies.frontier.result import Frontier
 from artde_gym.studies.frontier.store import GRID, FrontierStore
 from artde_gym.studies.frontier.table import LEVEL_COLUMNS, frontier_of
 
-RECORD_HZ = 10.0  # a frontier has hundreds of episodes; their traces are for a look at a fall, not for metrics
+RECORD_HZ = 10.0  # a frontier has hundreds of episodes; their traces are for viewing a fall, not for metrics
 
 
 @takes_old_names
@@ -109,11 +109,11 @@ def frontier(
         on_progress: called with the value of the running level and the progress of its episodes.
 
     Returns:
-        The frontier; `complete` is False after an interruption (Ctrl-C), with all finished levels in it.
+        The frontier; after an interruption (Ctrl-C), `complete` is False and all finished levels are in it.
 
     Raises:
-        UnknownNameError, OptionError, DisturbanceError, GainError: for a bad argument, before the first episode.
-        StoreError: if `out` holds other results, or results of other software, or is written by another process.
+        UnknownNameError, OptionError, DisturbanceError, GainError: for an invalid argument, before the first episode.
+        StoreError: if `out` holds other results or results of other software, or another process is writing to it.
     """
     plan = Plan.of(
         controllers,
@@ -138,7 +138,7 @@ def _configuration(plan: Plan, design: Design) -> dict[str, Any]:
     return {
         "env": plan.cells[0].env_id,
         "axis": dataclasses.asdict(design.axis),
-        "controllers": list(plan.controllers),  # what they stand for is checked by the folders of the levels
+        "controllers": list(plan.controllers),  # their content is checked by the levels' folders
         "survival": design.survival,
         "episodes": plan.episodes,
         "seed": plan.seed,
@@ -150,7 +150,7 @@ def _configuration(plan: Plan, design: Design) -> dict[str, Any]:
 
 
 class _Levels:
-    """The levels of a frontier, run where the bisection asks for them."""
+    """The levels of a frontier, run on request of the bisection."""
 
     def __init__(
         self,
@@ -225,7 +225,7 @@ class _Levels:
         return share.value >= self._design.survival
 
     def _run(self, index: int, names: list[str]) -> dict[str, bool]:
-        """Run a level with some of the controllers, and say which of them survived it."""
+        """Run a level with some of the controllers; return which of them survived."""
         value = self._design.axis.levels[index]
         plan = self._plan.only(names, self._design.at(value, self._plan.cells[0]))
         plan = dataclasses.replace(plan, gains=self._design.gains_at(value, plan))

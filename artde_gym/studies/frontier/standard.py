@@ -1,4 +1,4 @@
-"""The standard test of a frontier: each robot's own, see `artde_gym.kit.FrontierTest`."""
+"""The standard test of a frontier, defined by each robot; see `artde_gym.kit.FrontierTest`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from artde_gym.scenarios import scenario as find_scenario
 
 
 def standard_for(env_id: str) -> FrontierTest | None:
-    """Return the standard test of an environment's robot, if it has one."""
+    """Return the standard test of an environment's robot, or None."""
     return ROBOTS[robot_of(env_id)].frontier
 
 

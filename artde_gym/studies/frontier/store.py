@@ -37,7 +37,7 @@ class FrontierStore:
         self._write_record(found)
 
     def draw(self, found: Frontier) -> None:
-        from artde_gym.studies.frontier.figure import draw  # Matplotlib takes long: not at each start of a worker
+        from artde_gym.studies.frontier.figure import draw  # Matplotlib loads slowly: not at each start of a worker
 
         write_atomically(self.path / "frontier.png", lambda file: draw(found, file))
 

@@ -20,7 +20,7 @@ TABLE_COLUMNS += [f"{end}_rate{part}" for end in ("low", "high") for part in (""
 def frontier_of(
     varied: Axis, names: list[str], rows: list[dict[str, Any]], survival: float, folder: Path | None, complete: bool
 ) -> Frontier:
-    """Put together what is known from the rows of finished levels."""
+    """Build a frontier from the rows of finished levels."""
     order = {name: i for i, name in enumerate(names)}
     ordered = sorted(rows, key=lambda row: (row["value"], order[row["controller"]]))
     table = [_summary(varied, name, [row for row in rows if row["controller"] == name], survival) for name in names]
@@ -35,7 +35,7 @@ def frontier_of(
 
 
 def _summary(varied: Axis, name: str, rows: list[dict[str, Any]], survival: float) -> tuple[Any, ...]:
-    """One row of the table, from the levels of one controller."""
+    """Return one row of the table, from the levels of one controller."""
     grid = varied.levels
     by_level = {grid.index(row["value"]): row for row in rows}
     outcomes = {level: row["rate"] >= survival for level, row in by_level.items()}

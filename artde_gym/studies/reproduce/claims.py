@@ -1,8 +1,8 @@
-"""Claims as data, each with a verdict from seeded episodes; each robot brings its own.
+"""Claims as data, judged on seeded episodes; each robot provides its own.
 
-A verdict is *holds* or *does not hold* where the 95 % intervals say so, *undecided* where they do not, and *not
-measured* where an episode or a controller is missing. Claims of single runs ("TDE falls, ARTDE does not") are read as
-claims of what happens more often than not. A claim that is compared over several axes must hold on each of them.
+A verdict is *holds* or *does not hold* if the 95 % intervals decide, *undecided* if they do not, and *not measured* if
+an episode or a controller is missing. Claims of single runs ("TDE falls, ARTDE does not") are read as claims about the
+majority of runs. A claim that is compared over several axes must hold on each of them.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Outcome = Literal["holds", "does not hold", "undecided", "not measured"]
 
 @dataclasses.dataclass(frozen=True)
 class Verdict:
-    """What the episodes say of a claim: the outcome, and what was measured, in words with its interval."""
+    """The outcome of a claim, and the measured values in words with their interval."""
 
     outcome: Outcome
     measured: str
@@ -41,9 +41,9 @@ class Claim:
     """A statement that episodes can decide.
 
     Attributes:
-        scenario: in which it is made.
+        scenario: the scenario it concerns.
         text: the statement.
-        thesis: the publication's own number or observation; "ours" for a question that we add.
+        thesis: the publication's own number or observation; "ours" for an added question.
         judge: episodes -> verdict.
         ablation: whether it takes the ablation of `artde_gym.studies.reproduce.reproduction`.
         curve: what a grid of `frontier` varies, that `judge` is given in place of episodes in the scenario.
@@ -60,7 +60,7 @@ class Claim:
 def improves(
     scenario: str, rival: str, metric: str, axes: Sequence[str], least: float = 0.0
 ) -> Callable[[Result], Verdict]:
-    """On every axis the metric's mean is lower for ARTDE than for `rival` by at least `least` percent."""
+    """Claim that the metric's mean is lower for ARTDE than for `rival` by at least `least` percent, on every axis."""
 
     def judge(result: Result) -> Verdict:
         if missing := _missing(result, scenario, ("artde", rival)):
@@ -82,7 +82,7 @@ def improves(
 
 
 def falls(scenario: str, expected: dict[str, bool]) -> Callable[[Result], Verdict]:
-    """Each controller falls (True), or walks to the end (False), more often than not."""
+    """Claim that each controller falls (True), or finishes (False), more often than not."""
 
     def judge(result: Result) -> Verdict:
         if missing := _missing(result, scenario, tuple(expected)):
@@ -99,7 +99,7 @@ def falls(scenario: str, expected: dict[str, bool]) -> Callable[[Result], Verdic
 
 
 def repeats(scenario: str, other: str, metric: str, axes: Sequence[str], most: float) -> Callable[[Result], Verdict]:
-    """ARTDE's mean of the metric differs between two scenarios by at most `most` percent on every axis."""
+    """Claim that ARTDE's mean of the metric differs between two scenarios by at most `most` percent on every axis."""
 
     def judge(result: Result) -> Verdict:
         for name in (scenario, other):
@@ -138,7 +138,7 @@ def stays(scenario: str, other: str, metric: str, axes: Sequence[str], most: flo
 
 
 def adapts(scenario: str, rival: str, metric: str) -> Callable[[Result], Verdict]:
-    """ARTDE beats a TDE that does not adapt: fewer falls, or a smaller error where as many stay up."""
+    """Claim that ARTDE beats a TDE without adaptation: fewer falls, or a smaller error if as many finish."""
 
     def judge(result: Result) -> Verdict:
         rivals = ("artde", rival)
@@ -157,7 +157,7 @@ def adapts(scenario: str, rival: str, metric: str) -> Callable[[Result], Verdict
 
 
 def ordered(scenario: str, names: Sequence[str], metric: str) -> Callable[[Result], Verdict]:
-    """The metric's mean grows from each controller to the next."""
+    """Claim that the metric's mean grows from each controller to the next."""
 
     def judge(result: Result) -> Verdict:
         if missing := _missing(result, scenario, tuple(names)):
@@ -202,16 +202,16 @@ def outlasts(names: Sequence[str]) -> Callable[[Frontier], Verdict]:
 
 
 CLAIMS: Registry[tuple[Claim, ...]] = Registry("claims", "artde_gym.claims")
-"""Claims by robot: those of plug-ins, and those registered."""
+"""Claims by robot, from plug-ins and `register_claims`."""
 
 
 def register_claims(name: str, claims: Sequence[Claim], *, replace: bool = False) -> None:
-    """Have more claims judged by `reproduce`, in whose scenarios they are made.
+    """Add claims for `reproduce` to judge in their scenarios.
 
     Args:
-        name: under which they are known, such as a robot's.
-        claims: to be judged.
-        replace: whether they may take the place of others of the same name.
+        name: name of the set of claims, such as a robot's.
+        claims: the claims to judge.
+        replace: whether they may replace others with the same name.
 
     Raises:
         OptionError: if the name is taken and `replace` is not given.
@@ -246,9 +246,9 @@ def judge(
 
 
 def confirm(verdicts: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """Verdicts of several engines side by side: scenario, claim, one column an engine, confirmed.
+    """Put verdicts of several engines side by side: scenario, claim, one column per engine, confirmed.
 
-    A verdict is *confirmed* where every engine comes to it and it is a decision; else `confirmed` is empty.
+    A verdict is *confirmed* if every engine reaches it and it is a decision; else `confirmed` is empty.
     """
     keys = ["scenario", "claim"]
     joined = pd.DataFrame({engine: table.set_index(keys)["verdict"] for engine, table in verdicts.items()})
@@ -258,7 +258,7 @@ def confirm(verdicts: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
 
 
 def _upright(result: Result, scenario: str, controller: str) -> pd.DataFrame:
-    """Episodes without a fall."""
+    """Return the episodes without a fall."""
     rows = result.rows(scenario, controller)
     upright: pd.DataFrame = rows.loc[~rows["fell"].to_numpy(dtype=np.bool_)]
     return upright
@@ -272,13 +272,13 @@ def _within(estimates: Collection[Estimate], most: float) -> Outcome:
 
 
 def _missing(result: Result, scenario: str, controllers: tuple[str, ...]) -> Verdict | None:
-    """The verdict where a controller has no episode."""
+    """Return a verdict if a controller has no episode."""
     missing = [name for name in controllers if result.rows(scenario, name).empty]
     return Verdict("not measured", f"no episodes of {', '.join(missing)}") if missing else None
 
 
 def _nothing(result: Result, scenario: str, controllers: tuple[str, ...]) -> Verdict:
-    """The verdict where no seed has an episode without a fall of each controller."""
+    """Return the verdict for controllers without a common seed on which none of them falls."""
     fallen = [name for name in controllers if _upright(result, scenario, name).empty]
     return Verdict("not measured", f"no episode without a fall: {', '.join(fallen)}" if fallen else "no common seeds")
 

@@ -53,15 +53,15 @@ class Reproduction:
 
 
 def titles() -> list[str]:
-    """Return how users call the robots that have scenarios to reproduce."""
+    """Return the titles of the robots that have scenarios to reproduce."""
     return [kit.title for kit in ROBOTS.values() if kit.reproduced[0]]
 
 
 def kit_of(title: str) -> RobotKit:
-    """Return the robot that users call so.
+    """Return the robot with this title.
 
     Raises:
-        UnknownNameError: if there is none with scenarios to reproduce.
+        UnknownNameError: if no robot with scenarios to reproduce has it.
     """
     if title not in titles():
         raise UnknownNameError("robot", title, suggest_names(title, titles()))
@@ -69,7 +69,7 @@ def kit_of(title: str) -> RobotKit:
 
 
 def scenarios_of(robot: str, names: Sequence[str] | None = None) -> tuple[str, ...]:
-    """Return those of the named scenarios in which a robot moves; all that it is reproduced in for None.
+    """Return the named scenarios of a robot; all that reproduce it for None.
 
     Raises:
         UnknownNameError: for an unknown robot or scenario.
@@ -109,18 +109,18 @@ def reproduce(
         workers: processes; the results do not depend on it.
         engine: physics engine, in its fastest vectorized; None for the fastest of all.
         allow_mixed: as for `evaluate`.
-        on_progress: called with what runs ("episodes", "ablation in S1") and the progress of its episodes.
+        on_progress: called with the running part ("episodes", "ablation in S1") and the progress of its episodes.
 
     Raises:
-        UnknownNameError, OptionError: for a bad argument, before the first episode.
-        StoreError: if `out` holds other results, or results of other software, or is written by another process.
+        UnknownNameError, OptionError: for an invalid argument, before the first episode.
+        StoreError: if `out` holds other results or results of other software, or another process is writing to it.
     """
     chosen = scenarios_of(robot, scenarios)
     if not chosen:
         raise OptionError("scenarios", scenarios, f"at least one of the {robot}'s")
     names = list(kit_of(robot).reproduced[1] if controllers is None else controllers)
     if ABLATION in names:
-        raise OptionError("controllers", ABLATION, "other names; it is run by ablation=True, at gains of its own")
+        raise OptionError("controllers", ABLATION, "other names; pass ablation=True to run it")
     if ablation and ADAPTIVE not in names:
         raise OptionError("controllers", names, f"{ADAPTIVE!r} among them, from which the ablation takes its gain")
     vectorized, engine = fastest_engine(find_scenario(chosen[0]).env_id, engine)
@@ -195,7 +195,7 @@ def _with_ablation(
 
 
 def equivalent_gains(result: Result, scenario: str) -> dict[str, float]:
-    """The ablation's gains c (of a cascade c_p, c_q): means of ARTDE's over its episodes in a scenario."""
+    """Return the ablation's gains c (c_p, c_q for a cascade): means of ARTDE's over its episodes in a scenario."""
     rows = result.rows(scenario, ADAPTIVE)
     means = {column.removeprefix(GAIN): rows[column].to_numpy(np.float64) for column in rows if column.startswith(GAIN)}
     return {f"c{suffix}": float(values.mean()) for suffix, values in means.items() if np.isfinite(values).all()}

@@ -1,4 +1,4 @@
-"""What a sweep has found as a table for a terminal, one row a cell."""
+"""A sweep's results as a table for a terminal, one row per cell."""
 
 from __future__ import annotations
 
@@ -14,36 +14,38 @@ from artde_gym.evaluation import statistics
 from artde_gym.evaluation.environments import metrics_spec_of
 from artde_gym.studies.sweep.execution import Sweep
 
-MOST = 50  # rows
-WIDEST = 10_000  # characters, of a table that is measured
+MAX_ROWS = 50
+MAX_CHARACTERS = 10_000  # width at which a table is measured
 _PREFIXES = ("gains.", "env_kwargs.", "disturbance.")
 
 
 def print_sweep(found: Sweep, console: Console) -> None:
-    """Print what differs between the cells, their falls and their errors."""
+    """Print the cells' differences, falls and errors."""
     for name in found.set_aside:
-        console.print(f"Not as it had been written, set aside and run again: {name}")
+        console.print(f"Corrupt, set aside and run again: {name}")
     episodes: Any = found.episodes
     if episodes.empty:
         console.print("No episode was finished.")
         return
     varied = _varied(episodes)
     cells = [frame for _, frame in episodes.groupby([*varied, "cell"], dropna=False)]
-    table = _table(cells[:MOST], varied)
+    table = _table(cells[:MAX_ROWS], varied)
     console.print(
         table
-        if console.measure(table, options=console.options.update(max_width=WIDEST)).maximum <= console.width
-        else _narrow(cells[:MOST], varied)
+        if console.measure(table, options=console.options.update(max_width=MAX_CHARACTERS)).maximum <= console.width
+        else _narrow(cells[:MAX_ROWS], varied)
     )
-    if len(cells) > MOST:
-        console.print(f"... and {len(cells) - MOST} more cells: artde_gym.evaluation.read_sweep({str(found.folder)!r})")
+    if len(cells) > MAX_ROWS:
+        console.print(
+            f"... and {len(cells) - MAX_ROWS} more cells: artde_gym.evaluation.read_sweep({str(found.folder)!r})"
+        )
     if not found.complete:
-        console.print("Interrupted: the same command continues; finished episodes are kept.")
+        console.print("Interrupted; finished episodes are kept. Re-run the command to resume.")
     console.print(f"Written to {found.folder}")
 
 
 def _table(cells: list[Any], varied: list[str]) -> Table:
-    """One column for each label."""
+    """Return a table with one column per label."""
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
     for name in varied:
         table.add_column(Text(_short(name)), no_wrap=True)
@@ -55,7 +57,7 @@ def _table(cells: list[Any], varied: list[str]) -> Table:
 
 
 def _narrow(cells: list[Any], varied: list[str]) -> Table:
-    """All labels of a cell in one column, each on a line, and intervals under what they belong to."""
+    """Return a table with all labels of a cell in one column, one per line, and intervals below their values."""
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
     table.add_column("cell", overflow="fold")
     for title in ("falls (95 %)", "RMS error (95 %)"):
@@ -70,7 +72,7 @@ def _narrow(cells: list[Any], varied: list[str]) -> Table:
 
 
 def _figures(frame: Any) -> tuple[str, str, str, str]:
-    """Falls, their rate's interval, mean error and its interval."""
+    """Return falls, their rate's interval, mean error and its interval, as text."""
     falls, unit = int(frame["fell"].sum()), metrics_spec_of(frame.iloc[0]["env"]).errors[0].unit
     rate, error = statistics.rate(falls, len(frame)), statistics.mean(frame[f"rmse_{unit}"])
     span = f"{error.low:.3g}..{error.high:.3g}" if math.isfinite(error.low) else ""
@@ -78,7 +80,7 @@ def _figures(frame: Any) -> tuple[str, str, str, str]:
 
 
 def _varied(episodes: Any) -> list[str]:
-    """Columns that tell the cells apart: names, then what varies beside them and is one value in each cell."""
+    """Return the columns that distinguish the cells: names, then other columns with one value in each cell."""
     names = [name for name in ("env", "scenario", "controller") if episodes[name].nunique() > 1]
     if "scenario" in names and (episodes.groupby("scenario")["env"].nunique() == 1).all():
         names = [name for name in names if name != "env"]

@@ -1,22 +1,22 @@
-"""The cells of a sweep: what `sweep.yaml` says, checked and spread out.
+"""The cells of a sweep: the content of `sweep.yaml`, validated and expanded.
 
     scenario: S2                      # fixed: env, scenario, controller, gains, disturbances, env_kwargs, seed
     env_kwargs: {duration: 6.0}
-    episodes: 20                      # of each cell; episode i has the seed that `evaluate` gives it
+    episodes: 20                      # per cell; episode i has the seed that `evaluate` gives it
     grid:                             # every combination of these values ...
       controller: [tde, artde]
       env_kwargs.control_period: [0.001, 0.004]
-    sample:                           # ... with each of so many random draws
+    sample:                           # ... with each of these random draws
       draws: 50
       vary:
         gains.artde.gamma_0: {log_uniform: [50, 5000]}
         disturbances.payload.mass: {uniform: [0.5, 2.0]}
 
 A path is one of the fixed names, or one value inside: `gains.<controller>.<gain>`, `env_kwargs.<argument>`,
-`disturbances.<kind>` or `disturbances.<kind>.<parameter>`. Cells that come out the same count once, however they are
-written (`1` and `1.0`, a payload of `1` and of `{mass: 1}`, an argument that has its default): gains of a controller
-that a cell does not run change nothing in it. Draw i depends on the seed, i and the path alone: more draws,
-or more paths, leave it as it was, and every combination of the grid meets the same draws.
+`disturbances.<kind>` or `disturbances.<kind>.<parameter>`. Equal cells count once, however they are written (`1` and
+`1.0`, a payload of `1` and of `{mass: 1}`, an argument at its default): gains of a controller that a cell does not run
+change nothing in it. Draw i depends only on the seed, i and the path: more draws, or more paths, leave it unchanged,
+and every combination of the grid meets the same draws.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ import numpy as np
 from artde_gym.arguments import check_bool
 from artde_gym.deprecation import current_column, current_disturbances, warn
 from artde_gym.disturbances import DISTURBANCES
-from artde_gym.errors import OptionError, UnknownNameError, suggest_names
+from artde_gym.errors import MissingDependencyError, OptionError, UnknownNameError, suggest_names
 from artde_gym.evaluation import canonical
 from artde_gym.evaluation.cells import Cell, cells_of
 from artde_gym.evaluation.identity import identity_of
@@ -54,14 +54,14 @@ SETTINGS: dict[str, Any] = {
     "env_kwargs": {},
     "seed": 0,
 }
-"""What makes a cell, with its default; all of it as `evaluate` takes it, for one controller."""
+"""Settings of a cell with their defaults, as `evaluate` takes them, for one controller."""
 KEYS = (*SETTINGS, "episodes", "vectorized", "grid", "sample")
 INSIDE = ("gains.<controller>.<gain>", "disturbances.<kind>.<parameter>", "env_kwargs.<argument>")
 DISTRIBUTIONS = ("uniform", "log_uniform", "integers", "normal", "choice")
 MOST_CELLS = 100_000
 MOST_EPISODES = 2_000_000
 LARGEST = 1 << 20  # bytes of a file
-DEEPEST = 20  # levels of it
+DEEPEST = 20  # levels of nesting in it
 
 
 @dataclasses.dataclass(frozen=True)
@@ -70,11 +70,11 @@ class SweepCell:
 
     Attributes:
         cell: environment, arguments, disturbances.
-        controller: its name.
-        spec: what the name stands for.
-        gains: in place of its preset's.
-        seed: of the episodes, as `evaluate` takes it.
-        id: hash of everything that decides about its episodes.
+        controller: name of the controller.
+        spec: the registered controller of this name.
+        gains: gains that override its preset's.
+        seed: base seed, as `evaluate` takes it.
+        id: hash of everything that determines its episodes.
     """
 
     cell: Cell
@@ -86,7 +86,7 @@ class SweepCell:
 
     @property
     def columns(self) -> dict[str, Any]:
-        """What makes this cell as columns of a table; what is not given is left out."""
+        """Return this cell's settings as columns of a table, without those that are not given."""
         kwargs = dict(self.cell.kwargs)
         disturbances = kwargs.pop("disturbances", None)
         columns = {f"gains.{name}": _plain(value) for name, value in self.gains.items()}
@@ -97,7 +97,7 @@ class SweepCell:
 
 @dataclasses.dataclass(frozen=True)
 class Design:
-    """A whole sweep: `episodes` of every point. `text` is what was read, as JSON."""
+    """A whole sweep: `episodes` of every cell. `text` is the content of its file, as JSON."""
 
     points: tuple[SweepCell, ...]
     episodes: int
@@ -106,17 +106,17 @@ class Design:
 
 
 def read(path: str | Path) -> dict[str, Any]:
-    """A sweep file as plain values, those of YAML 1.2; nothing in it is ever run.
+    """Read a sweep file as plain values of YAML 1.2; nothing in it is ever executed.
 
     Raises:
-        OptionError: if it cannot be read, or is no YAML mapping of plain values.
+        OptionError: if it is not readable, or not a YAML mapping of plain values.
     """
     try:
         import yaml
 
         from artde_gym.studies.sweep.yaml12 import Loader
     except ImportError as error:
-        raise OptionError("pyyaml", "not installed", "pip install 'artde-gym[sweep]'") from error
+        raise MissingDependencyError("package", "pyyaml", "pip install 'artde-gym[sweep]'") from error
 
     try:
         with Path(path).open("rb") as file:
@@ -134,11 +134,11 @@ def read(path: str | Path) -> dict[str, Any]:
 
 
 def design(given: Mapping[str, Any]) -> Design:
-    """The cells of a sweep, from the content of its file.
+    """Return the cells of a sweep from the content of its file.
 
     Raises:
-        OptionError, UnknownNameError: for an unknown key, a wrong type, an unknown name, or too much of it all. What
-            environments and controllers themselves refuse is not asked here.
+        OptionError, UnknownNameError: for an unknown key, a wrong type, an unknown name, or too many cells or episodes.
+            Environments and controllers are not asked here.
     """
     _check_plain("sweep", given)
     given = _current(given)
@@ -153,9 +153,7 @@ def design(given: Mapping[str, Any]) -> Design:
     for name, value in fixed.items():
         _check_setting(name, value)
     grid = {_current_path(path): values for path, values in _grid(given.get("grid", {})).items()}
-    draws = _draws(
-        given.get("sample"), fixed["seed"]
-    )  # by the paths as they are written, so that old files draw the same
+    draws = _draws(given.get("sample"), fixed["seed"])  # by the paths as written, so that old files draw the same
     draws = [{_current_path(path): value for path, value in draw.items()} for draw in draws]
     for path, values in grid.items():
         if path in draws[0]:
@@ -180,7 +178,7 @@ def design(given: Mapping[str, Any]) -> Design:
 
 
 def _current(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the content of a sweep's file under the names of now."""
+    """Return the content of a sweep file with current names."""
     found = dict(given)
     if "backend" in found:
         warn("key 'backend' of a sweep", "'vectorized: true'")
@@ -195,7 +193,7 @@ def _current(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _current_path(path: str) -> str:
-    """Return a path under the names of now."""
+    """Return a path with current names."""
     now = current_column(path)
     if now != path:
         warn(f"path {path!r} of a sweep", repr(now))
@@ -213,7 +211,7 @@ def _grid(given: Any) -> dict[str, list[Any]]:
 
 
 def _draws(given: Any, seed: int) -> list[dict[str, Any]]:
-    """What each draw gives the paths that are sampled; one empty draw without a sample."""
+    """Return each draw's values by path; one empty draw without a sample."""
     if given is None:
         return [{}]
     if not (isinstance(given, Mapping) and given.keys() == {"draws", "vary"} and isinstance(given["vary"], Mapping)):
@@ -243,7 +241,7 @@ def _check_distribution(field: str, given: Any) -> None:
     if kind == "normal" and second < 0:
         raise OptionError(field, arguments, "a mean and a standard deviation >= 0")
     if kind != "normal" and not (first <= second and math.isfinite(float(second) - float(first))):
-        raise OptionError(field, arguments, "two numbers, the lower one first")
+        raise OptionError(field, arguments, "two numbers, the lower first")
     if kind == "log_uniform" and first <= 0:
         raise OptionError(field, arguments, "two numbers above zero")
     if kind == "integers" and max(map(abs, arguments)) >= 2**62:
@@ -266,7 +264,7 @@ def _draw(path: str, distribution: Mapping[str, list[Any]], seed: int, number: i
 
 
 def _settings(fixed: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
-    """The settings of one cell: the fixed ones, whole ones in their place, then single values inside."""
+    """Return the settings of one cell: the fixed ones, overridden by whole settings, then by single values inside."""
     settings = dict(fixed)
     settings |= {path: value for path, value in values.items() if path in SETTINGS}
     for path, value in values.items():
@@ -287,7 +285,7 @@ def _disturbed(settings: Mapping[str, Any], path: str, inside: str, value: Any) 
     given = settings["disturbances"]
     if given is None:
         if settings["scenario"] is None:
-            allowed = "with a scenario, or with disturbances to change ({} if there are no others)"
+            allowed = "with a scenario, or with disturbances ({} for no others)"
             raise OptionError("path", path, allowed)
         given = find_scenario(settings["scenario"]).disturbances
     kind, _, parameter = inside.partition(".")
@@ -332,7 +330,7 @@ def _check_path(path: str) -> None:
 
 
 def _check_at(path: str, value: Any) -> None:
-    """What a path gets; values inside a setting are for those to check who know them."""
+    """Check the value for a path; values inside a setting are checked by their owners."""
     if path in SETTINGS:
         _check_setting(path, value)
 
@@ -344,7 +342,7 @@ def _check_setting(name: str, value: Any) -> None:
         good, allowed = _is_whole(value) and value >= 0, "a whole number >= 0"
     elif name == "gains":
         good = isinstance(value, Mapping) and all(isinstance(gains, Mapping) for gains in value.values())
-        allowed = "a mapping of controllers to mappings of their gains"
+        allowed = "a mapping of controllers to mappings of gains"
     else:
         good = isinstance(value, Mapping) or (name == "disturbances" and value is None)
         allowed = "a mapping"
@@ -353,19 +351,19 @@ def _check_setting(name: str, value: Any) -> None:
 
 
 def _check_plain(field: str, value: Any, depth: int = 0) -> None:
-    """Only what JSON can write, so that nothing else ever gets into an environment or a file."""
+    """Check that JSON can store a value, so that nothing else ever gets into an environment or a file."""
     if depth > DEEPEST:
         raise OptionError(field, "...", f"at most {DEEPEST} levels")
     if isinstance(value, Mapping):
         for key, item in value.items():
             if not isinstance(key, str):
-                raise OptionError(f"key of {field}", key, "a word")
+                raise OptionError(f"key of {field}", key, "text")
             _check_plain(f"{field}: {key}", item, depth + 1)
     elif isinstance(value, list):
         for i, item in enumerate(value):
             _check_plain(f"{field}[{i}]", item, depth + 1)
     elif not (value is None or isinstance(value, (str, bool)) or _is_number(value)):
-        raise OptionError(field, value, "finite numbers, words, true, false, null, lists and mappings")
+        raise OptionError(field, value, "finite numbers, text, true, false, null, lists and mappings")
 
 
 def _is_number(value: Any) -> bool:
@@ -377,7 +375,7 @@ def _is_whole(value: Any) -> bool:
 
 
 def _plain(value: Any) -> Any:
-    """A value as a column holds it: numbers as float64, lists and mappings as JSON."""
+    """Convert a value for a column: numbers to float64, lists and mappings to JSON."""
     if isinstance(value, (list, dict)):
         return json.dumps(canonical.numbers(value), sort_keys=True)
     return value

@@ -1,7 +1,7 @@
 """Sweeps: any number of cells in seeded episodes, on any number of processes or machines, into one Parquet dataset.
 
-An episode is exactly that of `evaluate` with the same arguments, seed and number, to the last bit; where it runs, in
-which order and after how many interruptions makes no difference.
+An episode equals that of `evaluate` with the same arguments, seed and number, to the last bit, wherever it runs, in any
+order, and after any number of interruptions.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ OnProgress = Callable[[str, Update], None]
 
 @dataclasses.dataclass(frozen=True)
 class Sweep:
-    """What a sweep has found so far.
+    """The results of a sweep so far.
 
     Attributes:
-        episodes: one row each, as of `read_sweep`.
-        folder: where they are stored.
+        episodes: one row each, as from `read_sweep`.
+        folder: the results folder.
         complete: False after an interruption.
-        set_aside: files in the folder's `corrupt` that this run found not as they had been written.
+        set_aside: corrupt files that this run moved to the folder's `corrupt`.
     """
 
     episodes: pd.DataFrame
@@ -62,25 +62,25 @@ def sweep(
     allow_mixed: bool = False,
     on_progress: OnProgress | None = None,
 ) -> Sweep:
-    """Run all episodes of a sweep that its folder does not hold yet.
+    """Run all episodes of a sweep that are not in its folder yet.
 
     Args:
         given: a YAML file, or its content as plain values; see `artde_gym.studies.sweep.design`.
-        out: folder of the results, see `artde_gym.studies.sweep.store`. The same call continues after whatever
-            happened; a sweep that has more episodes than the folder adds the others.
-        workers: processes; the results do not depend on it.
-        executor: "local", or "ray" for a Ray cluster, which its workers share.
-        address: of a running Ray cluster, "auto" for this machine's; None starts one here with so many workers.
+        out: results folder, see `artde_gym.studies.sweep.store`. Repeat the call to resume; a sweep with more episodes
+            than the folder adds the others.
+        workers: number of processes; the results do not depend on it.
+        executor: "local", or "ray" for a Ray cluster, whose cores the workers share.
+        address: of a running Ray cluster, "auto" for this machine's; None starts one here with `workers` cores.
         allow_mixed: as for `evaluate`.
-        on_progress: called with what goes on ("cells checked", "episodes") and how far it is.
+        on_progress: called with the current phase ("cells checked", "episodes") and its progress.
 
     Returns:
-        What there is; `complete` is False after an interruption (Ctrl-C), with all finished episodes in it.
+        The results so far; after an interruption (Ctrl-C), `complete` is False and all finished episodes are in it.
 
     Raises:
-        UnknownNameError, OptionError, DisturbanceError, GainError: for a bad cell, before the first episode.
-        StoreError: if `out` holds anything else, is used by another process, or cannot be written (a full disk).
-        WorkerError: if workers keep ending before their episodes do.
+        UnknownNameError, OptionError, DisturbanceError, GainError: for an invalid cell, before the first episode.
+        StoreError: if `out` holds anything else, is in use by another process, or is not writable (a full disk).
+        WorkerError: if workers keep ending before their episodes are done.
     """
     check_workers(workers)
     _check_executor(executor, address)
@@ -115,7 +115,7 @@ def _check_executor(executor: Any, address: Any) -> None:
         allowed = f"{known}; a physics engine is an argument of environments (env_kwargs)"
         raise OptionError("executor", executor, allowed)
     if address is not None and executor != "ray":
-        raise OptionError("address", address, "none without executor 'ray'")
+        raise OptionError("address", address, "None without executor 'ray'")
     parquet.pyarrow()
     if address is not None:
         check_address(address)
@@ -135,7 +135,7 @@ def _runs(
 
 
 def _keep(runs: Runs, store: SweepStore, points: Mapping[str, SweepCell], progress: Progress) -> bool:
-    """Store episodes as they are finished; return False if interrupted."""
+    """Store episodes as they finish; return False if interrupted."""
     try:
         for task, results in runs:
             store.add(_rows(points[task.cell.name], task, results))
@@ -148,7 +148,7 @@ def _keep(runs: Runs, store: SweepStore, points: Mapping[str, SweepCell], progre
 
 
 def _run(task: Task, on_time: Callable[[float], None]) -> list[Episode]:
-    """Run a task; what goes wrong in one of many cells is told with the cell."""
+    """Run a task; an error names the cell."""
     try:
         return run_task(task, on_time)
     except ArtdeGymError as error:
@@ -157,19 +157,19 @@ def _run(task: Task, on_time: Callable[[float], None]) -> list[Episode]:
 
 
 def _refuse_others(plan: Design, store: SweepStore) -> None:
-    """A folder holds no episodes but those of its sweep, so that whoever reads it need not ask which are meant."""
+    """Reject a folder with episodes that are not of this sweep, so that its readers need not separate them."""
     cells = {point.id for point in plan.points}
     others = sum(cell not in cells or episode >= plan.episodes for cell, episode in store.done)
     if others:
         allowed = (
-            f"a new folder, or a sweep with all episodes that this one holds: {others} of {len(store.done)} belong to "
+            f"a new folder, or a sweep with all episodes in this one: {others} of {len(store.done)} belong to "
             "another one"
         )
         raise StoreError("sweep folder", str(store.folder), allowed)
 
 
 def _check(plan: Design, points: Mapping[str, SweepCell], done: set[Key], on_progress: OnProgress | None) -> None:
-    """Build everything once, so that a bad cell shows before the first episode; cells with episodes have been tried."""
+    """Build everything once, so that an invalid cell is reported before the first episode; skip cells with episodes."""
     begun = {cell for cell, _ in done}
     fresh = [(name, point) for name, point in points.items() if point.id not in begun]
     fresh.sort(key=lambda item: _place(item[1]))  # neighbors share an environment
@@ -184,7 +184,7 @@ def _check(plan: Design, points: Mapping[str, SweepCell], done: set[Key], on_pro
 
 
 def _behind(plan: Design) -> dict[str, str]:
-    """Weights and code behind the controllers, each of them built once for each environment."""
+    """Return hashes of the controllers' weights and code, each built once per environment."""
     found: dict[str, str] = {}
     for point in {(point.controller, point.cell.env_id): point for point in reversed(plan.points)}.values():
         policy = policy_for(point.spec, validate_cell(plan.vectorized, point.cell), point.gains)
@@ -193,14 +193,14 @@ def _behind(plan: Design) -> dict[str, str]:
 
 
 def _place(point: SweepCell) -> tuple[str, str, str]:
-    """Environment, arguments, disturbances."""
+    """Return environment, arguments and disturbances as sort keys."""
     kwargs = dict(point.cell.kwargs)
     disturbances = kwargs.pop("disturbances", None)
     return point.cell.env_id, json.dumps(kwargs), json.dumps(disturbances)
 
 
 def _tasks(plan: Design, points: Mapping[str, SweepCell], done: set[Key]) -> Iterator[Task]:
-    """Return what is left to run."""
+    """Return the remaining tasks."""
     names = {point.id: (name, point.controller) for name, point in points.items()}
     finished = {(*names[cell], episode) for cell, episode in done}
     return tasks_of([_case(name, point) for name, point in points.items()], plan.episodes, plan.vectorized, finished)

@@ -1,10 +1,10 @@
-"""Episodes as the bytes of one Parquet file that carries the hash of itself.
+"""Episodes as the bytes of one Parquet file that contains its own hash.
 
-The schema, version `SCHEMA`, is the same for all files of a sweep. Columns in front: `cell` (hash of all that makes a
-cell), `controller`, `env`, `scenario`, `seed`, `episode`. Then, in alphabetical order, what else makes the cell
+The schema, version `SCHEMA`, is the same for all files of a sweep. Columns in front: `cell` (hash of a cell's
+settings), `controller`, `env`, `scenario`, `seed`, `episode`. Then, in alphabetical order, the cell's other settings
 (`gains.<gain>`, `env_kwargs.<argument>`, `disturbances` as JSON), the columns of `artde_gym.evaluation.metrics` and the
-sampled disturbances (`disturbance.payload.mass`, ...). Numbers are float64, but for `seed` (uint64) and `episode`
-(int64); lists and mappings are JSON. What an episode has no value for is null, never NaN.
+sampled disturbances (`disturbance.payload.mass`, ...). Numbers are float64, except for `seed` (uint64) and `episode`
+(int64); lists and mappings are JSON. A missing value is null, never NaN.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from artde_gym.errors import OptionError, StoreError
+from artde_gym.errors import MissingDependencyError, StoreError
 
 SCHEMA = 2
 LABELS = {"cell": "text", "controller": "text", "env": "text", "scenario": "text", "seed": "seed", "episode": "whole"}
 Types = dict[str, str]
-"""Column -> "number", "text" or "switch", or "seed" and "whole" for one of `LABELS` each."""
+"""Column -> "number", "text" or "switch"; "seed" and "whole" for those of `LABELS`."""
 
 _VERSION, _DIGEST = "artde_gym.schema", b"artde_gym.sha256"
 _ZEROS = b"0" * 64
@@ -26,21 +26,21 @@ _STRING = b"\x18\x40"  # how Thrift's compact protocol announces 64 bytes
 
 
 def pyarrow() -> Any:
-    """The module.
+    """Import pyarrow.
 
     Raises:
-        OptionError: if it is not installed.
+        MissingDependencyError: if it is not installed.
     """
     try:
         import pyarrow
         import pyarrow.parquet
     except ImportError as error:
-        raise OptionError("pyarrow", "not installed", "pip install 'artde-gym[sweep]'") from error
+        raise MissingDependencyError("package", "pyarrow", "pip install 'artde-gym[sweep]'") from error
     return pyarrow
 
 
 def types_of(rows: Iterable[Mapping[str, Any]]) -> Types:
-    """What the columns of rows hold; None tells nothing.
+    """Return the types of the rows' columns; None has no type.
 
     Raises:
         StoreError: for a column of several types.
@@ -52,19 +52,19 @@ def types_of(rows: Iterable[Mapping[str, Any]]) -> Types:
 
 
 def joined(first: Types, second: Types) -> Types:
-    """The columns of both.
+    """Return the columns of both, with their types.
 
     Raises:
         StoreError: for a column of two types.
     """
     for name in first.keys() & second.keys():
         if first[name] != second[name]:
-            raise StoreError(f"column {name}", f"{first[name]} and {second[name]}", "one type in a whole sweep")
+            raise StoreError(f"column {name}", f"{first[name]} and {second[name]}", "one type throughout a sweep")
     return {**first, **second}
 
 
 def table(rows: Sequence[Mapping[str, Any]], types: Types) -> Any:
-    """Rows as an Arrow table."""
+    """Return rows as an Arrow table."""
     pa = pyarrow()
     fields = {name: getattr(pa, _ARROW[types[name]])() for name in _ordered(types)}
     columns = {
@@ -74,7 +74,7 @@ def table(rows: Sequence[Mapping[str, Any]], types: Types) -> Any:
 
 
 def widened(narrow: Any, types: Types) -> Any:
-    """A table with the columns it lacks, without values."""
+    """Return a table with the missing columns added, without values."""
     pa = pyarrow()
     for name in types.keys() - set(narrow.column_names):
         narrow = narrow.append_column(name, pa.nulls(len(narrow), getattr(pa, _ARROW[types[name]])()))
@@ -82,12 +82,12 @@ def widened(narrow: Any, types: Types) -> Any:
 
 
 def types_in(stored: Any) -> Types:
-    """What the columns of a table hold; "?" for what no column of ours does."""
+    """Return the types of a table's columns; "?" for an unknown type."""
     return {field.name: _NAMES.get(str(field.type), "?") for field in stored.schema}
 
 
 def encode(episodes: Any) -> bytes:
-    """A file of a table."""
+    """Return a table as the bytes of a file."""
     pa = pyarrow()
     sink = pa.BufferOutputStream()
     with pa.parquet.ParquetWriter(sink, episodes.schema, compression="zstd", store_schema=False) as writer:
@@ -98,14 +98,14 @@ def encode(episodes: Any) -> bytes:
 
 
 def decode(data: bytes) -> Any:
-    """The table of a file; nothing in it is interpreted before its hash has been found right.
+    """Return the table of a file; nothing in it is interpreted before its hash has been verified.
 
     Raises:
-        ValueError: if a byte is not as it was written.
+        ValueError: if any byte has changed.
     """
     at = _place_of_digest(data)
     if hashlib.sha256(_with_digest(data, _ZEROS)).hexdigest().encode() != data[at : at + len(_ZEROS)]:
-        raise ValueError("its hash is another one")
+        raise ValueError("its hash does not match")
     pa = pyarrow()
     try:
         found = pa.parquet.read_table(pa.BufferReader(data))

@@ -1,4 +1,4 @@
-"""Jobs on a Ray cluster, as `artde_gym.evaluation.workers` does them on one machine."""
+"""Parallel jobs on a Ray cluster, the counterpart of `artde_gym.evaluation.workers`."""
 
 from __future__ import annotations
 
@@ -10,38 +10,38 @@ import sys
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from artde_gym.errors import OptionError, WorkerError
+from artde_gym.errors import MissingDependencyError, OptionError, WorkerError
 from artde_gym.evaluation.provenance import software
 from artde_gym.evaluation.workers import AHEAD, PATIENCE, Job, Runs, Work
 
-ANSWER = 4.0  # s until a cluster has answered
-JOINED = 14.0  # s until a process has joined it
-JOIN = "import ray, sys; ray.init(sys.argv[1], log_to_driver=False, logging_level='ERROR')"
-SETTINGS = b"\x04"  # type of the first frame of a gRPC server, as of any that speaks HTTP/2
-HELLO = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + b"\0\0\0" + SETTINGS + b"\0" * 5
-RETRIES = 3  # of a job whose worker or node is lost
-STORE = 80 * 2**20  # bytes of shared memory for a cluster on this machine: results are a few kB
+ANSWER_TIMEOUT_S = 4.0  # until a cluster has answered
+JOIN_TIMEOUT_S = 14.0  # until a process has joined it
+JOIN_SCRIPT = "import ray, sys; ray.init(sys.argv[1], log_to_driver=False, logging_level='ERROR')"
+SETTINGS = b"\x04"  # type of the first frame of any HTTP/2 server, gRPC servers included
+HTTP2_PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + b"\0\0\0" + SETTINGS + b"\0" * 5
+MAX_RETRIES = 3  # of a job whose worker or node is lost
+OBJECT_STORE_BYTES = 80 * 2**20  # bytes of shared memory for a cluster on this machine: results are a few kB
 
 
 def run_on_ray(work: Work, jobs: Iterable[Job], workers: int, address: str | None, on_wait: Callable[[], None]) -> Runs:
-    """Do the jobs on a Ray cluster, one core each; what a lost worker or node was at is done again.
+    """Run the jobs on a Ray cluster, one core each; jobs of a lost worker or node are run again.
 
     Args:
-        work: a function of a module that all nodes have; what it tells of simulated times goes nowhere.
-        jobs: what it is called with.
-        workers: processes of a cluster that is started here.
+        work: a function of a module that all nodes have; simulated times that it reports are discarded.
+        jobs: its arguments.
+        workers: number of processes of a cluster that is started here.
         address: of a running cluster, "auto" for this machine's; None starts one here, which ends with this process.
         on_wait: called several times a second.
 
     Raises:
         OptionError: without Ray, if no cluster answers at the address, or for a node with other software.
-        WorkerError: if workers are lost again and again.
+        WorkerError: if workers are lost repeatedly.
     """
     ray = _ray()
     ours = not ray.is_initialized()
     if ours:
         _connect(ray, address, workers)
-    do = ray.remote(_on_node).options(num_cpus=1, max_retries=RETRIES)
+    do = ray.remote(_on_node).options(num_cpus=1, max_retries=MAX_RETRIES)
     wanted, left, running = software(), iter(jobs), dict[Any, Job]()
     cores = _cores(ray)
     try:
@@ -68,24 +68,28 @@ def _ray() -> Any:
     try:
         import ray
     except ImportError as error:
-        raise OptionError("ray", "not installed", "pip install 'artde-gym[scale]'") from error
+        raise MissingDependencyError("package", "ray", "pip install 'artde-gym[scale]'") from error
     return ray
 
 
 def _connect(ray: Any, address: str | None, workers: int) -> None:
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nobody is told what runs here, unless the user wants it
-    own = {"num_cpus": workers, "object_store_memory": STORE, "include_dashboard": False} if address is None else {}
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # Ray's usage reports are off unless the user enables them
+    own = (
+        {"num_cpus": workers, "object_store_memory": OBJECT_STORE_BYTES, "include_dashboard": False}
+        if address is None
+        else {}
+    )
     try:
         ray.init(address or "local", log_to_driver=False, logging_level="ERROR", **own)
     except Exception as error:  # it raises these, too
         reason = " ".join(str(error).split())
         if address is None:
-            raise WorkerError("Ray", reason, "a machine on which it starts, within 30 s") from error
-        raise OptionError("address", address, f"that of a running Ray cluster ({reason})") from error
+            raise WorkerError("Ray", reason, "a machine on which it starts within 30 s") from error
+        raise OptionError("address", address, f"the address of a running Ray cluster ({reason})") from error
 
 
 def check_address(address: str) -> None:
-    """See that there is a cluster at an address; Ray itself takes minutes to find that there is none.
+    """Check that there is a cluster at an address; Ray itself takes minutes to find that there is none.
 
     Raises:
         OptionError: without Ray, or if a process cannot join one within 20 s.
@@ -103,24 +107,26 @@ def check_address(address: str) -> None:
     reasons = [_silence(one, int(port)) for one in hosts]
     reason = _refusal(address) if "" in reasons else reasons[-1]
     if reason:
-        raise OptionError("address", address, f"that of a running Ray cluster, which answers within 20 s ({reason})")
+        raise OptionError(
+            "address", address, f"the address of a running Ray cluster that answers within 20 s ({reason})"
+        )
 
 
 def _refusal(address: str) -> str:
-    """Why a process cannot join a cluster in time, in words; empty if one can."""
-    command = [sys.executable, "-c", JOIN, address]
+    """Return the reason why a process cannot join a cluster in time; empty if it can."""
+    command = [sys.executable, "-c", JOIN_SCRIPT, address]
     try:
-        outcome = subprocess.run(command, capture_output=True, text=True, timeout=JOINED, check=False)
+        outcome = subprocess.run(command, capture_output=True, text=True, timeout=JOIN_TIMEOUT_S, check=False)
     except subprocess.TimeoutExpired:
         return "it does not let a process join"
     return "" if outcome.returncode == 0 else (outcome.stderr.strip().splitlines() or ["no reason given"])[-1]
 
 
 def _silence(host: str, port: int) -> str:
-    """Why there is no gRPC server, in words; empty if there is one."""
+    """Return the reason why there is no gRPC server; empty if there is one."""
     try:
-        with socket.create_connection((host, port), timeout=ANSWER) as connection:
-            connection.sendall(HELLO)
+        with socket.create_connection((host, port), timeout=ANSWER_TIMEOUT_S) as connection:
+            connection.sendall(HTTP2_PREFACE)
             answer = connection.recv(64)
     except (OSError, OverflowError, UnicodeError) as error:
         return str(error)
@@ -139,11 +145,11 @@ def _result(ray: Any, reference: Any) -> Any:
         raise error.cause from None
     except ray.exceptions.RayError as error:
         reason = str(error).strip().splitlines()[0]
-        raise WorkerError("Ray", reason, "workers that live; if memory is short, take fewer of them") from error
+        raise WorkerError("Ray", reason, "workers that keep running; if memory is short, use fewer workers") from error
 
 
 def _on_node(work: Work, job: Job, wanted: dict[str, str]) -> Any:
-    """Do a job in a worker, whose results would differ in their last bits with other software."""
+    """Run a job in a worker with the same software; other software could change the last bits of its results."""
     here = software()
     if here != wanted:
         raise OptionError("software of a Ray node", here, repr(wanted))

@@ -1,14 +1,14 @@
-"""The folder of a sweep, which outlives everything that may happen to what writes it.
+"""Crash-safe results folder of a sweep.
 
-    sweep.json                      format, and for each run what it was asked for and with what software
+    sweep.json                      format, and the request and software of each run
     episodes/part-000001.parquet    finished episodes, see `artde_gym.studies.sweep.parquet`; all have the same columns
-    corrupt/                        files that were not as they had been written; their episodes are run again
-    .lock                           held by the process that writes, see `artde_gym.evaluation.lock`
+    corrupt/                        corrupt files; their episodes are run again
+    .lock                           held by the writing process, see `artde_gym.evaluation.lock`
 
-Every file is written under another name, synchronized with the disk and renamed: it is there whole or not at all. An
-episode is known by its cell (a hash of everything that decides about it) and its number, so that none is run twice;
-one process alone writes, so that none is stored twice. A part waits for more episodes for a second, later for a
-hundredth of the run's time so far, at most for half a minute: no more work is lost when the process is killed.
+Every file is written under a temporary name, synchronized with the disk and renamed: it is complete or missing. An
+episode is identified by its cell (a hash of everything that determines it) and its number, so that none is run twice;
+only one process writes, so that none is stored twice. A part waits for more episodes for a second, later for a
+hundredth of the run's time so far, but for half a minute at most: no more work is lost if the process is killed.
 """
 
 from __future__ import annotations
@@ -42,16 +42,16 @@ Key = tuple[str, int]
 
 
 class SweepStore:
-    """A sweep's folder, opened to be written: read at once if it is there, changed by `begin` and later.
+    """A sweep's folder, opened for writing: an existing one is read at once; `begin` and later calls change it.
 
-    Who opens it holds its lock (`artde_gym.evaluation.lock`).
+    The caller must hold its lock (`artde_gym.evaluation.lock`).
 
     Attributes:
-        done: episodes that it holds.
-        set_aside: files that are not as they had been written.
+        done: episodes in it.
+        set_aside: corrupt files in it.
 
     Raises:
-        StoreError: if it cannot be read.
+        StoreError: if it is not readable.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -71,22 +71,22 @@ class SweepStore:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None or not issubclass(kind, StoreError):  # a disk that is full is not tried once more
+        if kind is None or not issubclass(kind, StoreError):  # a full disk is not tried once more
             self.flush()
 
     def begin(
         self, sweep: str, types: parquet.Types, behind: Mapping[str, str] | None = None, *, allow_mixed: bool = False
     ) -> None:
-        """Make the folder ready for episodes: what is corrupt goes aside, what an earlier process left half done goes.
+        """Prepare the folder for episodes: set corrupt files aside, and remove half-written ones.
 
         Args:
-            sweep: what was asked for, as JSON.
-            types: columns that episodes will have, as far as they are known.
-            behind: hashes of weights and code behind controllers.
-            allow_mixed: whether episodes that other software ran may be continued.
+            sweep: content of the sweep file, as JSON.
+            types: known columns of its episodes.
+            behind: hashes of the controllers' weights and code.
+            allow_mixed: whether to resume episodes of other software.
 
         Raises:
-            StoreError: if the folder holds something else, episodes that other software ran, or cannot be written.
+            StoreError: if the folder holds something else or episodes of other software, or is not writable.
         """
         before = self._runs[-1]["provenance"] if self.done and self._runs else None
         made_by = continued(self.folder, before, provenance(behind), allow_mixed=allow_mixed)
@@ -107,22 +107,22 @@ class SweepStore:
             self._write_record()
 
     def add(self, rows: Iterable[dict[str, Any]]) -> None:
-        """Take in finished episodes; they are written when `due` finds it time.
+        """Add finished episodes; `due` writes them in time.
 
         Raises:
-            StoreError: if they cannot be written; what is stored already stays whole.
+            StoreError: if they cannot be written; stored episodes stay complete.
         """
         self._waiting += rows
         self.due()
 
     def due(self) -> None:
-        """Write what has waited for long enough; errors as of `add`."""
+        """Write episodes that have waited long enough; raises the errors of `add`."""
         now = time.monotonic()
         if now - self._flushed >= min(max(SHORTEST, SHARE * (now - self._started)), LONGEST):
             self.flush()
 
     def flush(self) -> None:
-        """Write all that waits as one part; errors as of `add`."""
+        """Write all waiting episodes as one part; raises the errors of `add`."""
         if not self._waiting:
             return
         rows, self._waiting = self._waiting, []  # so that no interruption makes them two parts
@@ -139,20 +139,20 @@ class SweepStore:
         self._flushed = time.monotonic()
 
     def finish(self) -> None:
-        """Note that nothing is missing; errors as of `add`."""
+        """Record that the sweep is complete; raises the errors of `add`."""
         self.flush()
         self._runs[-1]["complete"] = True
         with self._writing():
             self._write_record()
 
     def _take(self) -> None:
-        """Read what is there."""
+        """Read the folder's content."""
         if _runs(self.folder) is None and not _parts(self.folder):
             raise _unreadable(self.folder)
         self._taken = True
         runs = _runs(self.folder)
         if runs is None and (self.folder / RECORD).exists():
-            self.set_aside.append(self.folder / RECORD)  # the parts tell all that is needed
+            self.set_aside.append(self.folder / RECORD)  # the parts contain all that is needed
         self._runs = runs or []
         for path in _parts(self.folder):
             try:
@@ -162,14 +162,14 @@ class SweepStore:
                 continue
             keys = list(zip(part["cell"].to_pylist(), part["episode"].to_pylist(), strict=True))
             if len(set(keys)) < len(keys) or not self.done.isdisjoint(keys):
-                self.set_aside.append(path)  # no file of this command: an episode stands in one of them, once
+                self.set_aside.append(path)  # not a file of this command: each episode is in only one of them
                 continue
             self.done.update(keys)
             self._parts[path] = parquet.types_in(part)
             self._types = parquet.joined(self._types, self._parts[path])
 
     def _clear(self, *patterns: str) -> None:
-        """Remove what a process was writing when it was killed."""
+        """Remove what a killed process was writing."""
         for pattern in patterns:
             for path in self.folder.glob(pattern):
                 path.unlink()
@@ -183,11 +183,11 @@ class SweepStore:
 
     def _write(self, path: Path, episodes: Any) -> None:
         data = parquet.encode(episodes)
-        write_atomically(path, lambda file: file.write(data), by_way_of=self.folder)  # readers see whole parts alone
+        write_atomically(path, lambda file: file.write(data), by_way_of=self.folder)  # readers only see complete parts
         self._parts[path] = dict(self._types)
 
     def _number(self) -> int:
-        """Of the last part; those set aside count, so that no name comes twice."""
+        """Return the number of the last part; those set aside count, so that names stay unique."""
         names = [path.name for path in self._parts] + [path.name for path in (self.folder / "corrupt").glob("*")]
         return max((int(found[1]) for name in names if (found := _NUMBERED.fullmatch(name))), default=0)
 
@@ -200,18 +200,18 @@ class SweepStore:
         try:
             yield
         except OSError as error:
-            allowed = f"one that can be written ({error}); what it holds is whole, and the same command continues"
+            allowed = f"a writable one ({error}); its content is intact: re-run the command to resume"
             raise StoreError("sweep folder", str(self.folder), allowed) from error
 
 
 def read_sweep(folder: str | Path) -> pd.DataFrame:
-    """The finished episodes of a sweep, one row each; see `artde_gym.studies.sweep.parquet` for the columns.
+    """Read the finished episodes of a sweep, one row each; see `artde_gym.studies.sweep.parquet` for the columns.
 
-    The order is that of the columns in front, however many processes ran the sweep. It may still be running.
+    Rows are ordered by the columns in front, however many processes ran the sweep. It may still be running.
 
     Raises:
-        StoreError: if the folder is no sweep's, or a file in it is corrupt.
-        OptionError: without pyarrow.
+        StoreError: if the folder is not a sweep's, or a file in it is corrupt.
+        MissingDependencyError: without pyarrow.
     """
     folder = Path(folder)
     if _runs(folder) is None:
@@ -230,7 +230,7 @@ def _parts(folder: Path) -> list[Path]:
 
 
 def _runs(folder: Path) -> list[dict[str, Any]] | None:
-    """The runs in the record; None if it cannot be read."""
+    """Return the runs in the record; None if it is not readable."""
     try:
         record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
         configuration, runs = record["configuration"], list(record["runs"])
@@ -251,5 +251,5 @@ def _read(path: Path) -> Any:
         part = parquet.decode(path.read_bytes())
         return part.rename_columns([current_column(name) for name in part.column_names])
     except (OSError, ValueError) as error:
-        allowed = f"as it was written ({error}); the sweep's command sets it aside and runs its episodes again"
+        allowed = f"an intact file ({error}); re-run the sweep to set it aside and run its episodes again"
         raise StoreError("part of a sweep", str(path), allowed) from error

@@ -1,7 +1,7 @@
-"""Sweep files as YAML: plain values as the core schema of YAML 1.2.2 (section 10.3) reads them, and nothing else.
+"""Sweep files as YAML: plain values by the core schema of YAML 1.2.2 (section 10.3), and nothing else.
 
-PyYAML's own are those of YAML 1.1, in which 1:30 is 90, 010 is 8, 1e-3 is a word, and so many a word is a truth value
-(yes, no, on, off) or a date. Here all these are what they look like to somebody who knows JSON.
+PyYAML follows YAML 1.1, in which 1:30 is 90, 010 is 8, 1e-3 is text, and many words are booleans (yes, no, on, off) or
+dates. Here they read as in JSON.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ _CORE = {
 
 
 class Loader(yaml.SafeLoader):
-    """Safe, and without what makes a small file a large one (aliases) or loses values (a key given twice)."""
+    """A safe loader that rejects aliases (they can make a small file large) and duplicate keys (they lose values)."""
 
     def compose_node(self, parent: Any, index: Any) -> Any:
         if self.check_event(yaml.AliasEvent):
-            raise yaml.YAMLError("an alias (*name), which sweep files do without")
+            raise yaml.YAMLError("an alias (*name), not allowed in sweep files")
         return super().compose_node(parent, index)
 
     def construct_mapping(self, node: Any, deep: bool = False) -> Any:
         keys = [(key.tag, key.value) for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
         for (_, key), count in collections.Counter(keys).items():
             if count > 1:
-                raise yaml.YAMLError(f"the key {key!r} {count} times")
+                raise yaml.YAMLError(f"the key {key!r} is given {count} times")
         return super().construct_mapping(node, deep)
 
 

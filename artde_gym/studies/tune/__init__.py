@@ -1,4 +1,4 @@
-"""Gains found for each controller with the same budget of trials, judged on held-out seeds."""
+"""Tuning with the same number of trials for each controller, judged on held-out seeds."""
 
 from artde_gym.studies.tune.tuning import Tuning, tune
 

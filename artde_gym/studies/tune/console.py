@@ -1,4 +1,4 @@
-"""Tuned gains beside their presets as tables for a terminal."""
+"""Tuned gains beside their presets, as tables for a terminal."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from artde_gym.studies.tune.tuning import TUNED, Tuning
 
 
 def print_tuning(found: Tuning, console: Console) -> None:
-    """Print each controller's error at its preset and at the tuned gains on held-out seeds, then the gains."""
+    """Print each controller's error with its preset and with the tuned gains on held-out seeds, then the gains."""
     console.print()
     if found.held_out is None or found.held_out.episodes.empty:
         console.print("Interrupted before the comparison.")
@@ -30,7 +30,7 @@ def print_tuning(found: Tuning, console: Console) -> None:
         console.print(_comparison(found, found.held_out.scenarios[0]))
         console.print(_gains(found))
     if not found.complete:
-        console.print("Interrupted: the same command continues; finished trials are kept.")
+        console.print("Interrupted; finished trials are kept. Re-run the command to resume.")
     if found.folder is not None:
         console.print(f"Written to {found.folder}")
 

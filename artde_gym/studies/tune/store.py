@@ -1,4 +1,4 @@
-"""The folder of one tuning: its record, and its trials as they are finished."""
+"""Crash-safe folder of one tuning: its record, and its finished trials."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ TRIAL_COLUMNS = ["controller", "trial", "cost", "error", "falls", "gains"]
 
 
 def frame_of(rows: list[dict[str, Any]]) -> pd.DataFrame:
-    """Make a table of trials."""
+    """Return trials as a table."""
     return pd.DataFrame(rows, columns=TRIAL_COLUMNS)
 
 
 def _parsed(row: Mapping[str, str]) -> dict[str, Any]:
-    """A row of trials.csv, to the last bit."""
+    """Parse a row of trials.csv, to the last bit."""
     numbers = {"trial": int(row["trial"]), "cost": float(row["cost"]), "falls": int(row["falls"])}
     return {**row, **numbers, "error": float(row["error"] or "nan")}
 
 
 class TuningStore:
-    """The folder of one tuning; it is made with the first finished trial, so that a bad argument leaves none behind."""
+    """The folder of one tuning, created with the first finished trial: an invalid argument leaves none behind."""
 
     def __init__(
         self, path: Path, configuration: Mapping[str, Any], behind_them: Mapping[str, str], allow_mixed: bool
@@ -61,14 +61,14 @@ class TuningStore:
                 self._write_record({}, complete=False)
 
     def write(self, rows: list[dict[str, Any]]) -> None:
-        """Keep the finished trials."""
+        """Store the finished trials."""
         if claim(self.path, RECORD, self._configuration) is None:
             self._write_record({}, complete=False)
         text = frame_of(rows).to_csv(index=False, lineterminator="\n")
         write_atomically(self.path / "trials.csv", lambda file: file.write(text.encode()))
 
     def finish(self, best: Mapping[str, Gains], complete: bool) -> None:
-        """Keep the best gains."""
+        """Store the best gains."""
         self._write_record(best, complete)
 
     def _write_record(self, best: Mapping[str, Gains], complete: bool) -> None:

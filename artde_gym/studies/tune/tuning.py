@@ -1,18 +1,17 @@
-"""Tuning: the same budget of trials for every controller, on training seeds; judged on seeds that nobody has seen.
+"""Tuning: the same number of trials for every controller on training seeds, judged on held-out seeds.
 
-A trial is one set of gains, flown or walked in the same seeded episodes by all controllers. Its cost is the mean over
-the episodes of the tracking error that the environment reports first (`rmse_m`, `rmse_deg`), where a fall after t
-seconds counts `FALL` (1 + 1 / (1 + t)), more than any error. Trial 0 is the controller's own preset; the others are
-proposed by Optuna's tree-structured Parzen estimator (Bergstra et al. 2011) within the ranges that the controller was
-registered with. The gains of the smallest cost are then compared with the preset on held-out seeds: what was gained on
-the training seeds alone is gone there.
+A trial is one set of gains, run in the same seeded episodes for all controllers. Its cost is the episodes' mean of the
+environment's main tracking error (`rmse_m`, `rmse_deg`), where a fall after t seconds counts `FALL` (1 + 1 / (1 + t)),
+more than any error. Trial 0 is the controller's own preset; the others are proposed by Optuna's tree-structured Parzen
+estimator (Bergstra et al. 2011) within the controller's registered ranges. The gains with the smallest cost are then
+compared with the preset on held-out seeds, which removes any gain from overfitting the training seeds.
 
-A proposal depends on the seed, the controller and its finished trials, and on nothing else: results are the same on any
-number of processes, and for a run that was interrupted and continued.
+A proposal depends only on the seed, the controller and its finished trials: results are the same for any number of
+processes, and for a resumed run.
 
     tuning.json      configuration, provenance and the best gains
-    trials.csv       one row a controller and trial
-    held-out/        the results folder of the comparison; "<name>-tuned" are the tuned ones
+    trials.csv       one row per controller and trial
+    held-out/        the results folder of the comparison; "<name>-tuned" are the tuned controllers
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ from artde_gym.studies.tune.proposer import Gains, Proposer
 from artde_gym.studies.tune.store import TRIAL_COLUMNS, TuningStore, frame_of
 
 TUNED = "-tuned"
-"""What is added to a controller's name where its tuned gains are meant."""
+"""Suffix of a controller's name for its tuned gains."""
 MOST_TRIALS = 10_000
 FALL = 1000.0
 """Cost of a fall, in the unit of the error."""
@@ -53,15 +52,15 @@ FALL = 1000.0
 
 @dataclasses.dataclass(frozen=True)
 class Tuning:
-    """What tuning found.
+    """The result of tuning.
 
     Attributes:
-        trials: one row a controller and trial: `cost`, mean `error` of the episodes without a fall (NaN without one),
+        trials: one row per controller and trial: `cost`, mean `error` of the episodes without a fall (NaN without one),
             number of `falls`, and `gains` as JSON.
         metric: column of the error.
         best: controller -> gains of its cheapest trial (the earliest of equal ones).
         held_out: the comparison; None if the trials were interrupted.
-        folder: where everything is stored, if it is.
+        folder: the results folder, if they are stored.
         complete: False after an interruption.
     """
 
@@ -92,22 +91,22 @@ def tune(
     allow_mixed: bool = False,
     on_progress: Callable[[str, Update], None] | None = None,
 ) -> Tuning:
-    """Tune every controller with the same budget, and compare each with its own preset on held-out seeds.
+    """Tune every controller with the same number of trials, and compare each with its preset on held-out seeds.
 
     Args:
         controllers: registered names.
         env_id: as for `evaluate`, also for `disturbances`, `env_kwargs`, `vectorized`, `workers` and `allow_mixed`.
-        scenario: one of `artde_gym.scenarios`; None for the environment as it is.
-        trials: of each controller, the preset included.
-        episodes: of each trial.
-        held_out: episodes of the comparison.
-        seed: of the proposals and of the training episodes; the comparison's episodes are those of seed + 1.
-        out: folder to store everything in; the same call continues an interrupted one.
-        on_progress: called with what runs ("trial 3 of 50", "held-out") and the progress of its episodes.
+        scenario: one of `artde_gym.scenarios`; None for the environment itself.
+        trials: number per controller, the preset included.
+        episodes: number per trial.
+        held_out: number of episodes of the comparison.
+        seed: base seed of the proposals and training episodes; the comparison's episodes have those of seed + 1.
+        out: results folder; repeat the call to resume.
+        on_progress: called with the running part ("trial 3 of 50", "held-out") and the progress of its episodes.
 
     Raises:
-        UnknownNameError, OptionError, DisturbanceError: for a bad argument, before the first trial.
-        StoreError: if `out` holds other results, or results of other software, or is written by another process.
+        UnknownNameError, OptionError, DisturbanceError: for an invalid argument, before the first trial.
+        StoreError: if `out` holds other results or results of other software, or another process is writing to it.
     """
     check_integer("trials", trials, 1, MOST_TRIALS)
     check_integer("held_out", held_out, 1, MOST_EPISODES)
@@ -143,11 +142,11 @@ def tune(
 
 
 def _names(controllers: Any) -> list[str]:
-    """Return the controllers, if they can be told from their tuned selves."""
+    """Return the controllers' names after checking that none looks like another's tuned name."""
     names = labeled(controllers)
     for name, item in names.items():
         if name != item:
-            raise OptionError("controllers", item, "registered names: an object has its own gains")
+            raise OptionError("controllers", item, "registered names; a policy object has its own gains")
     if canonical.twice([*names, *(name + TUNED for name in names)]):
         raise OptionError("controllers", list(names), f"names that differ by more than {TUNED!r}")
     return list(names)
@@ -160,7 +159,7 @@ def _one_scenario(scenario: Any) -> str | None:
 
 
 class _Search:
-    """The trials of all controllers, and the comparison in the end."""
+    """The trials of all controllers, and the final comparison."""
 
     def __init__(self, plan: Plan, on_progress: Callable[[str, Update], None] | None) -> None:
         env_id = plan.cells[0].env_id
@@ -170,7 +169,7 @@ class _Search:
         self.spaces = {name: tuning_space(name, single(env_id, json.dumps({}))) for name in plan.controllers}
 
     def run(self, trials: int, held_out: int, store: TuningStore | None) -> Tuning:
-        """Run what a store does not hold yet; None to keep nothing."""
+        """Run what a store does not contain yet; None to store nothing."""
         rows, folder = ([], None) if store is None else (store.rows, store.path)
         for number in range(trials):
             if not self._try(number, trials, rows, store):
@@ -182,7 +181,7 @@ class _Search:
         return Tuning(frame_of(rows), self.metric, best, result, folder, result.complete)
 
     def _try(self, number: int, trials: int, rows: list[dict[str, Any]], store: TuningStore | None) -> bool:
-        """Add one trial of each controller that has not had it; return False if interrupted."""
+        """Run one trial of each controller without it; return False if interrupted."""
         done = {row["controller"] for row in rows if row["trial"] == number}
         left = {name: item for name, item in self._plan.controllers.items() if name not in done}
         gains = {name: self._proposer.propose(name, self.spaces[name], _history(rows, name), number) for name in left}
@@ -197,7 +196,7 @@ class _Search:
         return result.complete
 
     def _compare(self, best: Mapping[str, Gains], episodes: int, folder: Path | None) -> Result:
-        """Compare tuned gains with presets on seeds of their own."""
+        """Compare tuned gains with presets on held-out seeds."""
         known = self._plan.controllers
         plan = dataclasses.replace(
             self._plan,
@@ -213,7 +212,7 @@ class _Search:
 
 
 def _behind(controllers: Sequence[str], env_id: str) -> dict[str, str]:
-    """Weights and code behind the controllers, at their own gains."""
+    """Return hashes of the controllers' weights and code, at their own gains."""
     known, env = registered_controllers(), single(env_id, json.dumps({}))
     found: dict[str, str] = {}
     for name in controllers:
