@@ -12,7 +12,7 @@ import numpy as np
 from artde_gym.arrays import Array
 from artde_gym.errors import RobotError
 from artde_gym.kit import ROBOTS
-from artde_gym.multibody.spec import Box, Colour, RobotSpec, Vector
+from artde_gym.multibody.spec import Box, Color, RobotSpec, Vector
 
 POINTS = 300  # at most, of a path
 
@@ -85,7 +85,7 @@ class Scene:
     sites: Mapping[str, Point] = dataclasses.field(default_factory=dict)
     contacts: tuple[Point, ...] = ()
     outlook: Outlook = OUTLOOK
-    tint: Colour | None = None
+    tint: Color | None = None
     path: Array | None = None
     footholds: tuple[tuple[float, float], ...] = ()
     sole: tuple[float, float] = (0.2, 0.1)
@@ -152,5 +152,5 @@ def _short(values: Any) -> list[float]:
     return [round(float(value), 4) for value in np.asarray(values)]
 
 
-def _hex(color: Colour) -> str:
+def _hex(color: Color) -> str:
     return "#" + "".join(f"{round(255 * part):02x}" for part in color[:3])

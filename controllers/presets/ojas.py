@@ -34,7 +34,7 @@ STIFF_M_BAR = 0.077
 """0.85 of the limit 0.0909 along the walk: valid still where all inertias are 15 % smaller than those of the model."""
 _STIFF = (
     "ours: the thesis' gains with m_bar = 0.077, 0.85 of its limit along the walk (`artde-gym design`), so that it is "
-    "valid where all inertias are 15 % smaller than modelled; at 1 ms, stiffness 770 Nm/rad in place of 420"
+    "valid where all inertias are 15 % smaller than modeled; at 1 ms, stiffness 770 Nm/rad in place of 420"
 )
 
 OJAS: dict[tuple[str, str], Preset] = {

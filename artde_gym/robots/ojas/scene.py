@@ -9,7 +9,7 @@ import numpy as np
 
 from artde_gym.arrays import Array
 from artde_gym.motion.scene import Outlook, Scene
-from artde_gym.robots.ojas.model import FOOT_CENTRE_AHEAD, FOOT_SIZE, ojas
+from artde_gym.robots.ojas.model import FOOT_CENTER_AHEAD, FOOT_SIZE, ojas
 from artde_gym.robots.ojas.report import PERIOD, pattern_of
 from artde_gym.robots.ojas.walking import walking_pattern
 
@@ -35,5 +35,5 @@ def scene(kwargs: Mapping[str, Any]) -> Scene:
 def _footholds(ankles: Array) -> tuple[tuple[float, float], ...]:
     """Return the middles of the soles on the ground, of ankles (samples, 2, 3) over time."""
     standing = ankles[ankles[..., 2] <= ankles[..., 2].min() + GROUNDED]
-    places = np.unique(np.round(standing[:, :2] + (FOOT_CENTRE_AHEAD, 0.0), 4), axis=0)
+    places = np.unique(np.round(standing[:, :2] + (FOOT_CENTER_AHEAD, 0.0), 4), axis=0)
     return tuple((x, y) for x, y in places.tolist())
