@@ -65,6 +65,7 @@ class BatchEnv(Counted, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
     control_period: float
     words: Words
     _disturbances: Disturbances
+    _apart: Sequence[Disturbances] = ()  # of each environment, where they differ
     _np_random: Any  # a list: one for each environment, as for the seeds
     _np_random_seed: Any
 
@@ -152,7 +153,8 @@ class BatchEnv(Counted, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
 
         Args:
             seed: one for each environment, or a number from which on they count; without, the generators go on.
-            options: those of the class' documentation, and Gymnasium's "reset_mask" (n,), where to reset.
+            options: those of the class' documentation, "disturbances" also as a list, one mapping for each environment;
+                and Gymnasium's "reset_mask" (n,), where to reset.
 
         Raises:
             OptionError: for an unknown option or value, or a scenario that needs another environment.
@@ -166,8 +168,7 @@ class BatchEnv(Counted, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
         seeds = self._seeds(seed)
         disturbances = disturbances_in(options, self)
         if disturbances is not None:
-            self._disturbances = self._parse(disturbances)
-            warn_of_idle(self._disturbances, self._last * self.control_period)
+            self._replace(disturbances)
         for i in np.flatnonzero(mask).tolist():
             if seeds[i] is not None:
                 self._np_random[i], self._np_random_seed[i] = seeding.np_random(seeds[i])
@@ -235,6 +236,18 @@ class BatchEnv(Counted, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
             allowed = f"{self.own_engine!r}; for engine {engine!r}: gym.make_vec(..., vectorization_mode='sync')"
             raise OptionError("engine", engine, allowed)
 
+    def _replace(self, given: Mapping[str, Any] | Sequence[Mapping[str, Any]]) -> None:
+        """Take other disturbances from now on: for all environments, or a list with those of each."""
+        if not isinstance(given, (list, tuple)):
+            self._disturbances, self._apart = self._parse(given), ()
+        elif len(given) == self.num_envs:
+            self._apart = [self._parse(one) for one in given]
+        else:
+            allowed = f"a mapping, or a list of {self.num_envs}, one for each environment"
+            raise OptionError("disturbances", f"a list of {len(given)}", allowed)
+        for one in self._apart or (self._disturbances,):
+            warn_of_idle(one, self._last * self.control_period)
+
     def _renew(
         self, observations: Array, info: dict[str, Any], told: Columns, ended: Mask
     ) -> tuple[Array, dict[str, Any]]:
@@ -282,7 +295,8 @@ class BatchEnv(Counted, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
         """Begin new episodes where the mask is true."""
         if not mask.any():
             return
-        drawn = {i: self._disturbances.draw(self._np_random[i]) for i in np.flatnonzero(mask).tolist()}
+        given = self._apart or (self._disturbances,) * self.num_envs
+        drawn = {i: given[i].draw(self._np_random[i]) for i in np.flatnonzero(mask).tolist()}
         self._k[mask] = 0
         self._start(drawn)
         if mask.all():

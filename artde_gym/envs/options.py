@@ -17,7 +17,7 @@ def warn_of_idle(disturbances: Disturbances, duration: float) -> None:
         warnings.warn(text, stacklevel=5)  # where gymnasium.make was called
 
 
-def disturbances_in(options: Mapping[str, Any], env: Any) -> Mapping[str, Any] | None:
+def disturbances_in(options: Mapping[str, Any], env: Any) -> Any:
     """The disturbances that reset options ask for, as they are given or those of a scenario; None if they do not.
 
     Raises:

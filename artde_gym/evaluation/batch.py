@@ -30,6 +30,7 @@ def run_batch(
     policy: Policy,
     seeds: Sequence[int],
     *,
+    options: dict[str, Any] | None = None,
     trace_hz: float = 100.0,
     traced: int = 0,
     phases: Sequence[Span] = (),
@@ -44,6 +45,7 @@ def run_batch(
         env: a vector environment of this project, of as many environments as there are seeds.
         policy: takes the observations of all of them at once.
         seeds: of the episodes.
+        options: of the reset.
         trace_hz: rate of the traces, at most the control rate; infinite for every sample.
         traced: the first so many episodes leave traces.
         phases: see `Metrics`.
@@ -56,7 +58,7 @@ def run_batch(
     looks = diagnosed_every(env, stride)
     split = env.observation_layout.split
 
-    observation, info = env.reset(seed=list(seeds))
+    observation, info = env.reset(seed=list(seeds), options=options)
     disturbances = env.sampled_disturbances
     metrics = metrics_for(env, disturbances, phases)
     live = np.ones(len(seeds), dtype=np.bool_)

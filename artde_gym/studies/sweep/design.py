@@ -13,10 +13,11 @@
         disturbances.payload.mass: {uniform: [0.5, 2.0]}
 
 A path is one of the fixed names, or one value inside: `gains.<controller>.<gain>`, `env_kwargs.<argument>`,
-`disturbances.<kind>` or `disturbances.<kind>.<parameter>`. Cells that come out the same count once, however they are
-written (`1` and `1.0`, a payload of `1` and of `{mass: 1}`, an argument that has its default): gains of a controller
-that a cell does not run change nothing in it. Draw i depends on the seed, i and the path alone: more draws,
-or more paths, leave it as it was, and every combination of the grid meets the same draws.
+`disturbances.<kind>`, `disturbances.<kind>.<parameter>`, or `disturbances.<kind>.<parameter>.<i>` of a vector. Cells
+that come out the same count once, however they are written (`1` and `1.0`, a payload of `1` and of `{mass: 1}`, an
+argument that has its default): gains of a controller that a cell does not run change nothing in it. Draw i depends on
+the seed, i and the path alone: more draws, or more paths, leave it as it was, and every combination of the grid meets
+the same draws.
 """
 
 from __future__ import annotations
@@ -35,10 +36,11 @@ from typing import Any, get_args
 import numpy as np
 
 from artde_gym.disturbances import KINDS
+from artde_gym.disturbances.kinds import parameters_of
 from artde_gym.errors import OptionError, UnknownNameError, among
 from artde_gym.evaluation import canonical
 from artde_gym.evaluation.cells import Cell, cells_of
-from artde_gym.evaluation.environments import Backend
+from artde_gym.evaluation.environments import Backend, robot_of
 from artde_gym.evaluation.identity import identity_of
 from artde_gym.registration import ControllerSpec, registered_controllers
 from artde_gym.scenarios import scenario as find_scenario
@@ -139,7 +141,7 @@ def design(given: Mapping[str, Any]) -> Design:
         OptionError, UnknownNameError: for an unknown key, a wrong type, an unknown name, or too much of it all. What
             environments and controllers themselves refuse is not asked here.
     """
-    _check_plain("sweep", given)
+    check_plain("sweep", given)
     for key in given:
         if key not in KEYS:
             raise OptionError("key of the sweep", key, among(key, KEYS))
@@ -150,7 +152,7 @@ def design(given: Mapping[str, Any]) -> Design:
         raise OptionError("backend", backend, among(backend, get_args(Backend)))
     fixed = {**SETTINGS, **{name: value for name, value in given.items() if name in SETTINGS}}
     for name, value in fixed.items():
-        _check_setting(name, value)
+        check_setting(name, value)
     grid, draws = _grid(given.get("grid", {})), _draws(given.get("sample"), fixed["seed"])
     for path, values in grid.items():
         if path in draws[0]:
@@ -167,7 +169,7 @@ def design(given: Mapping[str, Any]) -> Design:
     points: dict[str, Point] = {}
     for values in itertools.product(*grid.values()):
         for draw in draws:
-            point = _point(_settings(fixed, {**dict(zip(grid, values, strict=True)), **draw}), backend, names)
+            point = point_of(settings_of(fixed, {**dict(zip(grid, values, strict=True)), **draw}), backend, names)
             points.setdefault(point.id, point)
     if len(points) * episodes > MOST_EPISODES:
         raise OptionError("sweep", f"{len(points) * episodes} episodes", f"at most {MOST_EPISODES}")
@@ -178,7 +180,7 @@ def _grid(given: Any) -> dict[str, list[Any]]:
     if not isinstance(given, Mapping):
         raise OptionError("grid", given, "a mapping of paths to lists of values")
     for path, values in given.items():
-        _check_path(path)
+        check_path(path)
         if not (isinstance(values, list) and values):
             raise OptionError(f"grid: {path}", values, "a list with at least one value")
     return dict(given)
@@ -194,12 +196,13 @@ def _draws(given: Any, seed: int) -> list[dict[str, Any]]:
     if not (_is_whole(draws) and 1 <= draws <= MOST_CELLS):
         raise OptionError("sample: draws", draws, f"a whole number from 1 to {MOST_CELLS}")
     for path, distribution in vary.items():
-        _check_path(path)
-        _check_distribution(f"sample: {path}", distribution)
+        check_path(path)
+        check_distribution(f"sample: {path}", distribution)
     return [{path: _draw(path, distribution, seed, i) for path, distribution in vary.items()} for i in range(draws)]
 
 
-def _check_distribution(field: str, given: Any) -> None:
+def check_distribution(field: str, given: Any) -> None:
+    """Refuse what is no distribution of `DISTRIBUTIONS`."""
     if not (isinstance(given, Mapping) and len(given) == 1 and next(iter(given)) in DISTRIBUTIONS):
         raise OptionError(field, given, f"a mapping of one of {', '.join(DISTRIBUTIONS)} to a list")
     ((kind, arguments),) = given.items()
@@ -208,7 +211,7 @@ def _check_distribution(field: str, given: Any) -> None:
         if not (isinstance(arguments, list) and arguments):
             raise OptionError(field, arguments, "a list with at least one value")
         return
-    good = _is_whole if kind == "integers" else _is_number
+    good = _is_whole if kind == "integers" else is_number
     if not (isinstance(arguments, list) and len(arguments) == 2 and all(map(good, arguments))):
         raise OptionError(field, arguments, f"two {'whole ' * (kind == 'integers')}numbers")
     first, second = arguments
@@ -237,8 +240,8 @@ def _draw(path: str, distribution: Mapping[str, list[Any]], seed: int, number: i
     return min(max(math.exp(rng.uniform(math.log(first), math.log(second))), first), second)
 
 
-def _settings(fixed: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
-    """The settings of one cell: the fixed ones, whole ones in their place, then single values inside."""
+def settings_of(fixed: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    """Make the settings of one cell: the fixed ones, whole ones in their place, then single values inside."""
     settings = dict(fixed)
     settings |= {path: value for path, value in values.items() if path in SETTINGS}
     for path, value in values.items():
@@ -267,13 +270,33 @@ def _disturbed(settings: Mapping[str, Any], path: str, inside: str, value: Any) 
         raise UnknownNameError("disturbance", kind, among(kind, KINDS))
     if not parameter:
         return {**given, kind: value}
+    parameter, _, component = parameter.partition(".")
     names = [known.name for known in KINDS[kind].parameters]
     if parameter not in names:
         raise UnknownNameError(f"parameter of {kind}", parameter, among(parameter, names))
+    if component:
+        value = _with_component(_vector(settings, given, kind, parameter), path, component, value)
     return placed(given, kind, parameter, value)
 
 
-def _point(settings: Mapping[str, Any], backend: Backend, names: set[Any]) -> Point:
+def _vector(settings: Mapping[str, Any], given: Mapping[str, Any], kind: str, name: str) -> Any:
+    """Find what a parameter is before one of its components is set."""
+    env_id = settings["env"] or find_scenario(settings["scenario"]).env_id
+    known = KINDS[kind]
+    (parameter,) = (one for one in known.parameters if one.name == name)
+    default = known.default_of(parameter, robot_of(env_id))
+    return default if known.repeated else parameters_of(kind, given.get(kind)).get(name, default)
+
+
+def _with_component(vector: Any, path: str, component: str, value: Any) -> list[Any]:
+    places = [str(i) for i in range(len(vector))] if isinstance(vector, (list, tuple)) else []
+    if component not in places:
+        raise UnknownNameError(f"component in {path}", component, among(component, places) or "none: it is one value")
+    return [value if place == component else one for place, one in zip(places, vector, strict=True)]
+
+
+def point_of(settings: Mapping[str, Any], backend: Backend, names: set[Any]) -> Point:
+    """Make the cell of some settings; `names` are the controllers of the whole study, whose gains may be given."""
     known, controller = registered_controllers(), settings["controller"]
     if controller not in known:
         raise UnknownNameError("controller", controller, among(controller, known))
@@ -289,7 +312,8 @@ def _point(settings: Mapping[str, Any], backend: Backend, names: set[Any]) -> Po
     return Point(cell, controller, spec, gains, seed, digest[:16])
 
 
-def _check_path(path: str) -> None:
+def check_path(path: str) -> None:
+    """Refuse what is no path to a setting."""
     head, _, rest = path.partition(".")
     depth = {"gains": 2, "env_kwargs": 1, "disturbances": 1}.get(head, 0)
     if path not in SETTINGS and not (depth and rest.count(".") >= depth - 1 and all(path.split("."))):
@@ -299,10 +323,11 @@ def _check_path(path: str) -> None:
 def _check_at(path: str, value: Any) -> None:
     """What a path gets; values inside a setting are for those to check who know them."""
     if path in SETTINGS:
-        _check_setting(path, value)
+        check_setting(path, value)
 
 
-def _check_setting(name: str, value: Any) -> None:
+def check_setting(name: str, value: Any) -> None:
+    """Refuse a whole setting of the wrong type."""
     if name in ("env", "scenario", "controller"):
         good, allowed = value is None or isinstance(value, str), "a name"
     elif name == "seed":
@@ -317,23 +342,24 @@ def _check_setting(name: str, value: Any) -> None:
         raise OptionError(name, value, allowed)
 
 
-def _check_plain(field: str, value: Any, depth: int = 0) -> None:
-    """Only what JSON can write, so that nothing else ever gets into an environment or a file."""
+def check_plain(field: str, value: Any, depth: int = 0) -> None:
+    """Refuse what JSON cannot write, so that nothing else ever gets into an environment or a file."""
     if depth > DEEPEST:
         raise OptionError(field, "...", f"at most {DEEPEST} levels")
     if isinstance(value, Mapping):
         for key, item in value.items():
             if not isinstance(key, str):
                 raise OptionError(f"key of {field}", key, "a word")
-            _check_plain(f"{field}: {key}", item, depth + 1)
+            check_plain(f"{field}: {key}", item, depth + 1)
     elif isinstance(value, list):
         for i, item in enumerate(value):
-            _check_plain(f"{field}[{i}]", item, depth + 1)
-    elif not (value is None or isinstance(value, (str, bool)) or _is_number(value)):
+            check_plain(f"{field}[{i}]", item, depth + 1)
+    elif not (value is None or isinstance(value, (str, bool)) or is_number(value)):
         raise OptionError(field, value, "finite numbers, words, true, false, null, lists and mappings")
 
 
-def _is_number(value: Any) -> bool:
+def is_number(value: Any) -> bool:
+    """Return whether a value is a finite number."""
     return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
 
 

@@ -91,9 +91,9 @@ def sweep(
     points = {f"{point.cell.name} [{i}]": point for i, point in enumerate(plan.points)}
     complete = True
     with SweepStore(Path(out)) as store:
-        _refuse_others(plan, store)
+        refuse_others(plan, store)
         _check(plan, points, store.done, on_progress)
-        store.begin(plan.text, types, _behind(plan), allow_mixed=allow_mixed)
+        store.begin(plan.text, types, evidence_of(plan), allow_mixed=allow_mixed)
         total = len(points) * plan.episodes
         progress = Progress(len(store.done), total, on_progress and functools.partial(on_progress, "episodes"))
 
@@ -155,8 +155,8 @@ def _run(task: Task, on_time: Callable[[float], None]) -> list[Episode]:
         raise type(error)(f"{error.field} ({cell})", error.value, error.allowed) from error
 
 
-def _refuse_others(plan: Design, store: SweepStore) -> None:
-    """A folder holds no episodes but those of its sweep, so that whoever reads it need not ask which are meant."""
+def refuse_others(plan: Design, store: SweepStore) -> None:
+    """Refuse a folder with episodes of another sweep, so that whoever reads it need not ask which are meant."""
     cells = {point.id for point in plan.points}
     others = sum(cell not in cells or episode >= plan.episodes for cell, episode in store.done)
     if others:
@@ -182,8 +182,8 @@ def _check(plan: Design, points: Mapping[str, Point], done: set[Key], on_progres
             on_progress("cells checked", Update(task, 0.0, True, i, len(fresh)))
 
 
-def _behind(plan: Design) -> dict[str, str]:
-    """Weights and code behind the controllers, each of them built once for each environment."""
+def evidence_of(plan: Design) -> dict[str, str]:
+    """Hash weights and code behind the controllers, each of them built once for each environment."""
     found: dict[str, str] = {}
     for point in {(point.controller, point.cell.env_id): point for point in reversed(plan.points)}.values():
         policy = policy_for(point.spec, tried(plan.backend, point.cell), point.gains)
