@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple
 
@@ -138,6 +139,7 @@ class RobotKit:
         push: of live play; None to push at the first site with 10 N.
         report: module with `reference(kwargs)` and `figures(episode)`, see `artde_gym.report.robot`; None for the
             figures that all robots have.
+        multiverse: file of its standard design of plausible worlds; None if it has none.
     """
 
     name: str
@@ -154,6 +156,7 @@ class RobotKit:
     motion: Motion = MOTION
     push: Push | None = None
     report: str | None = None
+    multiverse: Path | None = None
 
     @property
     def sites(self) -> tuple[str, ...]:

@@ -7,6 +7,8 @@ arrays with the observations' leading axes, so that one policy object serves any
 from __future__ import annotations
 
 import abc
+import copy
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from artde_gym.errors import OptionError
 from artde_gym.layout import Layout
 from controllers.laws.tracking import Array, Memory, Signals
+from controllers.stacked import stacked_gains
 
 
 class Plant(NamedTuple):
@@ -44,7 +47,12 @@ class Policy(abc.ABC):
         name: under which results are listed.
         plant: the environment that it drives.
         gains: of the law, in its own terms.
+
+    Attributes:
+        period: L that the law divides by (s); None where it has none, or more than gains to tell policies apart.
     """
+
+    period: float | None = None
 
     def __init__(self, name: str, plant: Plant, gains: Any) -> None:
         self.name = name
@@ -106,6 +114,23 @@ class Policy(abc.ABC):
         force, state = self.step(state, signals, given)
         clipped = np.minimum(np.maximum(force, self._low), self._high)
         return clipped if clipped.dtype == force.dtype else clipped.astype(force.dtype), state
+
+    def stacked(self, policies: Sequence[Any]) -> Policy | None:
+        """Return one policy that drives each row of observations as the policy at its place would alone, bit for bit.
+
+        None where it cannot: the policies differ in more than gains, or in gains that a law takes one by one.
+        """
+        others = {
+            (type(policy), policy.name, policy.period) if isinstance(policy, Policy) else None for policy in policies
+        }
+        if others != {(type(self), self.name, self.period)} or self.period is None:
+            return None
+        gains = stacked_gains([policy.gains for policy in policies])
+        if gains is None:
+            return None
+        whole = copy.copy(self)
+        whole.gains = gains
+        return whole
 
     def remembered(self, state: Memory) -> dict[str, Array]:
         """What the memory holds of the law's inside, by name: sigma, s, beta, c, ..., as far as it has them."""

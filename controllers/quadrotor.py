@@ -31,7 +31,7 @@ class QuadrotorPolicy(Policy):
         period = plant.control_period
         own = {"position": position(gains.position, period), "attitude": attitude(gains.attitude, period)}
         super().__init__(name, plant, dataclasses.replace(gains, **own))
-        self._period = period
+        self.period = self._period = period
         self._at = plant.observation.slices
 
     def read(self, observation: Array) -> Flight:

@@ -12,6 +12,7 @@ from artde_gym.arrays import Array
 from artde_gym.evaluation.rollout import Policy
 
 Mask = NDArray[np.bool_]
+Rows = NDArray[np.int64]
 
 
 class _State(NamedTuple):
@@ -27,14 +28,13 @@ class SideBySide:
 
     Args:
         policies: of each row; rows with the same object are computed at once.
+        kinds: of each row; those of one kind are computed at once, too, if they differ in gains alone and their class
+            has `stacked` (`controllers.policies.Policy`).
     """
 
-    def __init__(self, policies: Sequence[Policy]) -> None:
-        rows: dict[int, list[int]] = {}
-        for row, policy in enumerate(policies):
-            rows.setdefault(id(policy), []).append(row)
-        self._parts = [(policies[some[0]], np.array(some)) for some in rows.values()]
-        if all(hasattr(policy, "diagnostics") for policy, _ in self._parts):
+    def __init__(self, policies: Sequence[Policy], kinds: Sequence[str]) -> None:
+        self._parts = [part for group in _rows_by(kinds) for part in _parts(policies, group)]
+        if any(hasattr(policy, "diagnostics") for policy, _ in self._parts):
             self.diagnostics = self._diagnostics
 
     def predict(
@@ -56,11 +56,28 @@ class SideBySide:
         return np.asarray(actions), _State(remembered, np.asarray(actions), over)
 
     def _diagnostics(self, state: _State) -> dict[str, Array]:
+        """Tell what the policies know, NaN in rows of those that do not tell it."""
         told: dict[str, Array] = {}
         for (policy, rows), own in zip(self._parts, state.policies, strict=True):
-            diagnose: Any = policy
-            for name, values in diagnose.diagnostics(own).items():
+            diagnose: Any = getattr(policy, "diagnostics", lambda _: {})
+            for name, values in diagnose(own).items():
                 if name not in told:
-                    told[name] = np.zeros((len(state.over), *np.shape(values)[1:]), np.asarray(values).dtype)
+                    told[name] = np.full((len(state.over), *np.shape(values)[1:]), np.nan)
                 told[name][rows] = values
         return told
+
+
+def _parts(policies: Sequence[Policy], group: Rows) -> list[tuple[Policy, Rows]]:
+    """Divide rows of one kind of policy into parts: one for all that can be stacked, else one a policy."""
+    some = [policies[row] for row in group.tolist()]
+    apart = [group[rows] for rows in _rows_by([id(policy) for policy in some])]
+    stack = getattr(some[0], "stacked", None)
+    whole = stack(some) if stack is not None and len(apart) > 1 else None
+    return [(whole, group)] if whole is not None else [(policies[rows[0]], rows) for rows in apart]
+
+
+def _rows_by(keys: Sequence[Any]) -> list[Rows]:
+    rows: dict[Any, list[int]] = {}
+    for row, key in enumerate(keys):
+        rows.setdefault(key, []).append(row)
+    return [np.array(some) for some in rows.values()]

@@ -11,6 +11,7 @@ where the thesis' pattern of falls appears in MuJoCo; not confirmed in Bullet. 3
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 from artde_gym.kit import Environment, FrontierTest, Motion, Push, Range, RobotKit, random_push
@@ -134,4 +135,5 @@ KIT = RobotKit(
     motion=Motion("walk", 6.0, 2.0),
     push=Push("chest", 20.0),
     report="artde_gym.robots.ojas.report",
+    multiverse=Path(__file__).parent / "assets/multiverse.yaml",
 )

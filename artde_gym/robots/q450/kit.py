@@ -6,6 +6,7 @@ gripped), and by a start within 5 mm of the path (as a vehicle hovers there).
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from artde_gym.kit import Environment, FrontierTest, Motion, Push, Range, RobotKit, random_push
@@ -81,4 +82,5 @@ KIT = RobotKit(
     motion=Motion("flight", 4.0, 29.0),
     push=Push("body", 3.0),
     report="artde_gym.robots.q450.report",
+    multiverse=Path(__file__).parent / "assets/multiverse.yaml",
 )
