@@ -15,10 +15,10 @@ from artde_gym.palette import Look, looks
 from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.html import Cell, details, figure, paragraph, table
 from artde_gym.studies.multiverse.claims import OUTCOMES
-from artde_gym.studies.multiverse.console import deciding_text, p_text, share_text
+from artde_gym.studies.multiverse.console import all_deciding, deciding_text, p_text, share_text
 from artde_gym.studies.multiverse.deciding import Deciding, Node, rank_correlations
 from artde_gym.studies.multiverse.factor import Factor
-from artde_gym.studies.multiverse.result import Multiverse
+from artde_gym.studies.multiverse.result import FATES, Multiverse
 from artde_gym.studies.multiverse.verdict import Verdict
 
 WIDE, SIDE = 460, 64  # units of a chart, and of its margins
@@ -30,6 +30,8 @@ SHOWN: dict[str, Look] = {
     "tie": Look("#9A9A9A", "s"),
     "reverses": Look("#D55E00", "s"),
 }
+
+ENDED: dict[str, Look] = {FATES[False]: SHOWN["holds"], FATES[True]: SHOWN["reverses"]}
 
 
 def answer(found: Multiverse) -> tuple[str, list[str]]:
@@ -209,20 +211,18 @@ def _effects(found: Multiverse) -> str:
 
 
 def _trees(found: Multiverse) -> list[str]:
-    """What decides about each claim, a tree each; the first one open."""
+    """What decides about survival and about each claim, a tree each; the first one open."""
     drawn: list[str] = []
-    for verdict in found.verdicts:
-        try:
-            decided = found.deciding(verdict)
-        except MissingDependencyError as error:
-            return [paragraph(f"Which factors decide is not told: {error}", "soft")]
-        if decided is None:
-            continue
-        text = f"{verdict.claim.text}: {deciding_text(found, verdict)}."
-        shown = {name: SHOWN[name] for name in OUTCOMES if name in decided.classes}
-        kept = figure(text, {"": _tree(decided, found.design.factors, shown)}, shown) + _importance(found, decided)
-        drawn.append(kept if not drawn else details(verdict.claim.text, kept))
-    return drawn or [paragraph("Almost all worlds agree on each claim: there is nothing to decide.", "soft")]
+    try:
+        for what, decided in all_deciding(found):
+            if decided is not None:
+                shown = {name: look for name, look in {**SHOWN, **ENDED}.items() if name in decided.classes}
+                chart = {"": _tree(decided, found.design.factors, shown)}
+                part = figure(f"{what}: {deciding_text(found, decided)}.", chart, shown) + _importance(found, decided)
+                drawn.append(details(what, part) if drawn else part)
+    except MissingDependencyError as error:
+        return [paragraph(f"Which factors decide is not told: {error}", "soft")]
+    return drawn or [paragraph("Almost all worlds agree: there is nothing to decide.", "soft")]
 
 
 def _tree(decided: Deciding, factors: Sequence[Factor], shown: Mapping[str, Look]) -> str:

@@ -176,15 +176,23 @@ def test_worlds_side_by_side_are_those_of_evaluate_one_at_a_time(biped, quadroto
         assert found.complete
         assert sorted(found.episodes["controller"].unique()) == ["artde", MATCHED, "tde"]
         for world in (0, 2):
-            for controller, line in zip(found.controllers, found.command(world), strict=True):
-                row = found.episodes[(found.episodes["world"] == world) & (found.episodes["controller"] == controller)]
-                same_episode(row.iloc[0], run_again(line).iloc[0])
+            lines = found.command(world)
+            assert len(lines) == 2  # the second pass has one of its own
+            for line in lines:
+                for _, other in run_again(line).iterrows():
+                    name = MATCHED if line == lines[1] else str(other["controller"])
+                    same_episode(episode(found, world, name), other)
 
 
 def test_worlds_of_a_batch_are_those_of_single_environments(biped):
     line = biped.command(1, ("artde",))[0].replace("--backend batch", "--backend single")
-    row = biped.episodes[(biped.episodes["world"] == 1) & (biped.episodes["controller"] == "artde")]
-    same_episode(row.iloc[0], run_again(line).iloc[0])
+    same_episode(episode(biped, 1, "artde"), run_again(line).iloc[0])
+
+
+def episode(found: Any, world: int, controller: str) -> Any:
+    rows = found.episodes[(found.episodes["world"] == world) & (found.episodes["controller"] == controller)]
+    assert len(rows) == 1
+    return rows.iloc[0]
 
 
 def test_the_command_line_reproduces_a_world(biped, tmp_path):
@@ -193,7 +201,7 @@ def test_the_command_line_reproduces_a_world(biped, tmp_path):
     outcome = CliRunner().invoke(app, [*words[1:], "--out", str(tmp_path / "again"), "--workers", "1"])
     assert outcome.exit_code == 0, outcome.output
     again = parse_table((tmp_path / "again/episodes.csv").read_text(), ("controller",))
-    row = biped.episodes[(biped.episodes["world"] == 3) & (biped.episodes["controller"] == MATCHED)].iloc[0]
+    row = episode(biped, 3, MATCHED)
     assert row["rmse_deg"] == again["rmse_deg"][0]
     assert row["duration_s"] == again["duration_s"][0]
 
@@ -204,7 +212,7 @@ def run_again(line: str) -> pd.DataFrame:
     given = dict(zip(words[::2], words[1::2], strict=True))
     read = {name: json.loads(given.get(f"--{name}", "{}")) for name in ("env-kwargs", "gains")}
     return evaluate(
-        [given["--controllers"]],
+        given["--controllers"].split(","),
         given["--env"],
         scenario=given["--scenario"],
         episodes=int(given["--episodes"]),
@@ -219,7 +227,8 @@ def run_again(line: str) -> pd.DataFrame:
 def same_episode(row: Any, other: Any) -> None:
     """Equal to the last bit, in all that both tell but the label of the second pass."""
     for name in set(row.index) & set(other.index) - {"controller"}:
-        mine, theirs = row[name], other[name]
+        mine: Any = row[name]
+        theirs: Any = other[name]
         assert mine == theirs or (pd.isna(mine) and pd.isna(theirs)), name
 
 
@@ -320,7 +329,7 @@ def test_claims_are_counted_by_hand(claim, holds, tie, reverses):
 
 def test_the_ends_of_a_claim_are_the_worlds_of_the_largest_margins():
     found = verdict_of(survives("atde", "tde"), WorldTable(by_hand(), "rmse_deg", ("atde", "tde")))
-    assert FALLS["tde"][found.most_favorable] > FALLS["atde"][found.most_favorable]
+    assert found.most_favorable in (1, 3)  # where tde alone falls
     assert found.least_favorable == 4
     smaller_error = verdict_of(smaller("atde", "tde"), WorldTable(by_hand(), "rmse_deg", ("atde", "tde")))
     assert (smaller_error.decided, smaller_error.most_favorable) == (1, 2)

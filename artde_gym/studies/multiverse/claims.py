@@ -111,7 +111,7 @@ def smaller(first: str, second: str, metric: str | None = None) -> WorldClaim:
         return Judged(np.where(both, np.sign(theirs - mine), np.nan), margin)
 
     what = "RMS error" if metric is None else metric
-    text = f"where both survive, {first} has the smaller {what} than {second}"
+    text = f"{what} of {first} below that of {second}, both surviving"
     return WorldClaim(text, (first, second), judge, compares_errors=True)
 
 

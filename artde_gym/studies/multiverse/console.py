@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 from rich import box
 from rich.console import Console
@@ -12,8 +13,11 @@ from rich.text import Text
 from artde_gym.errors import MissingDependencyError
 from artde_gym.evaluation.statistics import Estimate
 from artde_gym.studies.multiverse.claims import OUTCOMES
+from artde_gym.studies.multiverse.deciding import Deciding
 from artde_gym.studies.multiverse.result import Multiverse
-from artde_gym.studies.multiverse.verdict import Verdict
+
+TOLD = 0.01
+"""Share of the worlds by which a factor, or a tree, must tell more than without it to be named."""
 
 
 def print_multiverse(found: Multiverse, console: Console) -> None:
@@ -63,30 +67,32 @@ def _claims(found: Multiverse) -> Table:
 
 def _print_deciding(found: Multiverse, console: Console) -> None:
     try:
-        for verdict in found.verdicts:
-            if line := deciding_text(found, verdict):
-                console.print(f"{verdict.claim.text}: {line}")
+        for what, decided in all_deciding(found):
+            if decided is not None:
+                console.print(f"{what}: {deciding_text(found, decided)}")
     except MissingDependencyError as error:
         console.print(f"Which factors decide is not told: {error}")
 
 
-def deciding_text(found: Multiverse, verdict: Verdict) -> str:
-    """Say which factors decide about a claim; empty where almost all worlds agree.
+def all_deciding(found: Multiverse) -> Iterator[tuple[str, Deciding | None]]:
+    """Yield what decides about the survival of each controller, then about each claim.
 
     Raises:
         MissingDependencyError: without scikit-learn.
     """
-    decided = found.deciding(verdict)
-    if decided is None:
-        return ""
-    if decided.accuracy <= decided.baseline:
-        return (
-            f"no factor decides (a tree is right in {100 * decided.accuracy:.0f} %, the commonest outcome is as often)"
-        )
+    for name in found.controllers:
+        yield f"Survival of {name}", found.deciding_survival(name)
+    for verdict in found.verdicts:
+        yield verdict.claim.text, found.deciding(verdict)
+
+
+def deciding_text(found: Multiverse, decided: Deciding) -> str:
+    """Say which factors decide, the most important one first, and how well they tell."""
     order = decided.importance.argsort()[::-1]
-    names = [found.design.factors[i].name for i in order if decided.importance[i] > 0.01]
+    names = [found.design.factors[i].name for i in order if decided.importance[i] > TOLD]
     right = f"a tree is right in {100 * decided.accuracy:.0f} %, always the commonest in {100 * decided.baseline:.0f} %"
-    return f"decided by {', then '.join(names) or 'nothing alone'} ({right})"
+    known = decided.accuracy > decided.baseline + TOLD and names
+    return f"decided by {', then '.join(names)} ({right})" if known else f"no factor tells ({right})"
 
 
 def _print_ends(found: Multiverse, console: Console) -> None:

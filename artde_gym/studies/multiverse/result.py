@@ -23,6 +23,7 @@ from artde_gym.studies.multiverse.verdict import Verdict, verdict_of
 from artde_gym.studies.reproduce.reproduction import ABLATION
 from artde_gym.studies.sweep.store import RECORD, read_sweep
 
+FATES = {False: "survives", True: "falls"}
 _GAINS, _KWARGS = "gains.", "env_kwargs."
 
 
@@ -78,14 +79,21 @@ class Multiverse:
         Raises:
             MissingDependencyError: without scikit-learn.
         """
-        if verdict.claim.text not in self._decidings:
-            said = {value: name for name, value in OUTCOMES.items()}
-            known = np.isfinite(verdict.outcome)
-            worlds = [number for number, decided in zip(verdict.worlds, known.tolist(), strict=True) if decided]
-            classes = [said[value] for value in verdict.outcome[known].tolist()]
-            found = what_decides(self.factors(worlds), classes) if worlds else None
-            self._decidings[verdict.claim.text] = found
-        return self._decidings[verdict.claim.text]
+        said = {value: name for name, value in OUTCOMES.items()}
+        outcomes = zip(verdict.worlds, verdict.outcome.tolist(), strict=True)
+        return self._deciding(verdict.claim.text, {world: said[value] for world, value in outcomes if value in said})
+
+    def deciding_survival(self, controller: str) -> Deciding | None:
+        """Return which factors decide about the survival of a controller; errors as of `deciding`."""
+        rows: pd.DataFrame = self.episodes.loc[self.episodes["controller"] == controller]
+        ended = zip(rows["world"].tolist(), rows["fell"].tolist(), strict=True)
+        return self._deciding(f"survival of {controller}", {world: FATES[bool(fell)] for world, fell in ended})
+
+    def _deciding(self, what: str, classes: Mapping[int, str]) -> Deciding | None:
+        if what not in self._decidings:
+            worlds = list(classes)
+            self._decidings[what] = what_decides(self.factors(worlds), list(classes.values())) if worlds else None
+        return self._decidings[what]
 
     @functools.cached_property
     def _decidings(self) -> dict[str, Deciding | None]:
@@ -97,26 +105,38 @@ class Multiverse:
         return statistics.rate(int((~fell.astype(bool)).sum()), len(fell))
 
     def command(self, world: int, controllers: tuple[str, ...] | None = None) -> list[str]:
-        """Return commands, one for each controller, that run a world again; each copyable.
+        """Return copyable commands that run a world again, as few as possible: the second pass has one of its own.
 
         Raises:
             OptionError: for a world or controller without an episode.
         """
-        return [self._command(world, name) for name in controllers or tuple(self.controllers)]
+        rows = [self._row(world, name) for name in controllers or tuple(self.controllers)]
+        apart = [row for row in rows if row["controller"] == MATCHED]
+        return [
+            self._command(world, some)
+            for some in ([row for row in rows if row["controller"] != MATCHED], apart)
+            if some
+        ]
 
-    def _command(self, world: int, controller: str) -> str:
+    def _row(self, world: int, controller: str) -> dict[str, Any]:
+        """Return an episode without what it has no value for."""
         rows = self.episodes[(self.episodes["world"] == world) & (self.episodes["controller"] == controller)]
         if rows.empty:
             raise OptionError("world", f"{world} of {controller}", "one that has been run")
-        row = {str(key): value for key, value in rows.iloc[0].items() if value is not None and value == value}
-        name = ABLATION if controller == MATCHED else controller
-        scenario = row["scenario"]
-        words = ["artde-gym", "evaluate", "--controllers", name, "--env", row["env"], "--scenario", scenario]
-        words += ["--episodes", "1", "--seed", str(self.design.worlds[world].seed), "--backend", self.design.backend]
-        kwargs, gains = _inside(row, _KWARGS), _inside(row, _GAINS)
+        return {str(key): value for key, value in rows.iloc[0].items() if value is not None and value == value}
+
+    def _command(self, world: int, rows: list[dict[str, Any]]) -> str:
+        names = [ABLATION if row["controller"] == MATCHED else row["controller"] for row in rows]
+        kwargs, gains = _inside(rows[0], _KWARGS), {}
+        for name, row in zip(names, rows, strict=True):
+            if own := _inside(row, _GAINS):
+                gains[name] = own
+        words = ["artde-gym", "evaluate", "--controllers", ",".join(names), "--env", rows[0]["env"]]
+        words += ["--scenario", rows[0]["scenario"], "--episodes", "1", "--seed", str(self.design.worlds[world].seed)]
+        words += ["--backend", self.design.backend]
         words += ["--env-kwargs", json.dumps(kwargs)] if kwargs else []
-        words += ["--disturbances", row["disturbances"]] if "disturbances" in row else []
-        words += ["--gains", json.dumps({name: gains})] if gains else []
+        words += ["--disturbances", rows[0]["disturbances"]] if "disturbances" in rows[0] else []
+        words += ["--gains", json.dumps(gains)] if gains else []
         return shlex.join(words)
 
 
@@ -131,7 +151,10 @@ def read_multiverse(folder: str | Path) -> Multiverse:
     run = last_run(folder)
     if run is None:
         raise StoreError("multiverse", str(folder), "a folder that `artde-gym multiverse` wrote")
-    return Multiverse(read_sweep(folder), design(run["sweep"]), folder, bool(run["complete"]), run["provenance"])
+    episodes = read_sweep(folder)
+    if "world" in episodes:
+        episodes = episodes.astype({"world": np.int64})
+    return Multiverse(episodes, design(run["sweep"]), folder, bool(run["complete"]), run["provenance"])
 
 
 def last_run(folder: Path) -> dict[str, Any] | None:
