@@ -103,8 +103,8 @@ def _stacked(chart: Chart, counts: Sequence[int], shown: Sequence[Look], y: floa
 def _claims(found: Multiverse) -> str:
     rows = []
     for verdict in found.verdicts:
-        shares = [(verdict.share(outcome), verdict.count(outcome)) for outcome in OUTCOMES]
-        cells = [Cell(f"{count}: {share_text(share)}" if share.n else "", share.value) for share, count in shares]
+        shares = [verdict.share(outcome) for outcome in OUTCOMES]
+        cells = [Cell(share_text(share), share.value if share.n else None) for share in shares]
         p = Cell(p_text(verdict.p_value), None if math.isnan(verdict.p_value) else verdict.p_value)
         rows.append([Cell(verdict.claim.text, kind="text"), Cell(str(verdict.decided), verdict.decided), *cells, p])
     columns = ["claim", "worlds", *(f"{outcome}, % (95 %)" for outcome in OUTCOMES), "sign test p"]
