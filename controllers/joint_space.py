@@ -20,8 +20,11 @@ class LawPolicy(TrackingPolicy):
     def __init__(self, name: str, plant: Plant, gains: Any, time_base: float = 1.0) -> None:
         check_positive_number("time_base", time_base)
         self._law, convert = LAWS[name]
-        self.period = self._period = time_base * plant.control_period
+        self._period = time_base * plant.control_period
         super().__init__(name, plant, convert(gains, self._period))
+
+    def law(self) -> tuple[str, float]:
+        return self.name, self._period
 
     def start(self, signals: Signals) -> Memory:
         return self._law.start(self.gains, signals, self._period)

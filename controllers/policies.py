@@ -47,12 +47,7 @@ class Policy(abc.ABC):
         name: under which results are listed.
         plant: the environment that it drives.
         gains: of the law, in its own terms.
-
-    Attributes:
-        period: L that the law divides by (s); None where it has none, or more than gains to tell policies apart.
     """
-
-    period: float | None = None
 
     def __init__(self, name: str, plant: Plant, gains: Any) -> None:
         self.name = name
@@ -115,15 +110,17 @@ class Policy(abc.ABC):
         clipped = np.minimum(np.maximum(force, self._low), self._high)
         return clipped if clipped.dtype == force.dtype else clipped.astype(force.dtype), state
 
+    def law(self) -> tuple[str, float] | None:
+        """Return the law and the period L that it divides by (s); None where more than gains tells policies apart."""
+        return None
+
     def stacked(self, policies: Sequence[Any]) -> Policy | None:
         """Return one policy that drives each row of observations as the policy at its place would alone, bit for bit.
 
         None where it cannot: the policies differ in more than gains, or in gains that a law takes one by one.
         """
-        others = {
-            (type(policy), policy.name, policy.period) if isinstance(policy, Policy) else None for policy in policies
-        }
-        if others != {(type(self), self.name, self.period)} or self.period is None:
+        others = {(type(policy), policy.law()) for policy in policies if isinstance(policy, Policy)}
+        if self.law() is None or others != {(type(self), self.law())}:
             return None
         gains = stacked_gains([policy.gains for policy in policies])
         if gains is None:

@@ -31,7 +31,7 @@ class QuadrotorPolicy(Policy):
         period = plant.control_period
         own = {"position": position(gains.position, period), "attitude": attitude(gains.attitude, period)}
         super().__init__(name, plant, dataclasses.replace(gains, **own))
-        self.period = self._period = period
+        self._period = period
         self._at = plant.observation.slices
 
     def read(self, observation: Array) -> Flight:
@@ -65,6 +65,9 @@ class QuadrotorPolicy(Policy):
         """`e_q` and `e_w`, the errors of the attitude loop (rad, rad/s, body axes)."""
         e_q, e_w = attitude_errors(self.gains, state, signals)
         return {"e_q": e_q, "e_w": e_w}
+
+    def law(self) -> tuple[str, float]:
+        return self.name, self._period
 
     def start(self, signals: Flight) -> Memory:
         return cascade_start(self._position, self._attitude, self.gains, signals, self._period)
