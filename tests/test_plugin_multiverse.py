@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-
 from test_plugin import install, run
 
 pytest.importorskip("pyarrow", reason="pyarrow is not installed (extra sweep)")

@@ -20,7 +20,7 @@ def multiverse(
     seed: Annotated[int | None, typer.Option(help="Seed of the worlds. Default: the design's.")] = None,
     out: Annotated[Path | None, typer.Option(help="Results folder. Default: runs/multiverse-<design>.")] = None,
     workers: Workers = None,
-    backend: Annotated[
+    vectorized: Annotated[
         str | None, typer.Option(help="single, or batch: worlds side by side. Default: the design's.")
     ] = None,
     engine: Engine = None,
@@ -35,7 +35,7 @@ def multiverse(
             out or Path("runs") / f"multiverse-{Path(design).stem}",
             worlds=worlds,
             seed=seed,
-            backend=backend,  # pyright: ignore[reportArgumentType]  # checked there
+            vectorized=vectorized,  # pyright: ignore[reportArgumentType]  # checked there
             engine=engine,
             workers=processes(workers),
             allow_mixed=allow_mixed,

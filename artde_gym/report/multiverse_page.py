@@ -11,7 +11,7 @@ import pandas as pd
 
 from artde_gym.errors import MissingDependencyError
 from artde_gym.evaluation import statistics
-from artde_gym.palette import Look, looks
+from artde_gym.palette import Style, styles
 from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.html import Cell, details, figure, paragraph, table
 from artde_gym.studies.multiverse.claims import OUTCOMES
@@ -25,13 +25,13 @@ WIDE, SIDE = 460, 64  # units of a chart, and of its margins
 ROW = 38  # units, of a bar with its words
 BINS = 6  # of the survival curve
 COLUMNS = 24  # of a histogram
-SHOWN: dict[str, Look] = {
-    "holds": Look("#0072B2", "s"),
-    "tie": Look("#9A9A9A", "s"),
-    "reverses": Look("#D55E00", "s"),
+SHOWN: dict[str, Style] = {
+    "holds": Style("#0072B2", "s"),
+    "tie": Style("#9A9A9A", "s"),
+    "reverses": Style("#D55E00", "s"),
 }
 
-ENDED: dict[str, Look] = {FATES[False]: SHOWN["holds"], FATES[True]: SHOWN["reverses"]}
+ENDED: dict[str, Style] = {FATES[False]: SHOWN["holds"], FATES[True]: SHOWN["reverses"]}
 
 
 def answer(found: Multiverse) -> tuple[str, list[str]]:
@@ -83,7 +83,7 @@ def _verdict_bars(verdicts: Sequence[Verdict]) -> str:
         chart.label(0.0, y + 0.62, f"{verdict.claim.text} ({verdict.decided})")
         _stacked(chart, [verdict.count(outcome) for outcome in OUTCOMES], list(SHOWN.values()), y, 0.0, 100.0)
         low, high = verdict.share("holds")[1:3]
-        chart.line([100 * low, 100 * high], [y + 0.3] * 2, Look("#000000", "o"), text="95 % interval of holds")
+        chart.line([100 * low, 100 * high], [y + 0.3] * 2, Style("#000000", "o"), text="95 % interval of holds")
     caption = (
         "In how many worlds each claim holds, ties and reverses; in brackets, of how many it tells. The line is the "
         "95 % interval (Wilson) of the share in which it holds."
@@ -91,7 +91,7 @@ def _verdict_bars(verdicts: Sequence[Verdict]) -> str:
     return figure(caption, {"": chart.svg()}, SHOWN)
 
 
-def _stacked(chart: Chart, counts: Sequence[int], shown: Sequence[Look], y: float, left: float, right: float) -> None:
+def _stacked(chart: Chart, counts: Sequence[int], shown: Sequence[Style], y: float, left: float, right: float) -> None:
     total, start = max(sum(counts), 1), left
     for count, look in zip(counts, shown, strict=True):
         end = start + (right - left) * count / total
@@ -122,7 +122,7 @@ def _survival(found: Multiverse) -> str:
 def _curves(found: Multiverse) -> str:
     """Survival against one factor, a chart for each value of another."""
     along, by = found.design.figure
-    shown = looks(found.controllers)
+    shown = styles(found.controllers)
     numbers = along.numbers(_values(found, along))
     edges = np.unique(np.quantile(numbers, np.linspace(0.0, 1.0, BINS + 1)))
     x = Axis.of(along.label, numbers, log=along.kind == "log_uniform")
@@ -145,7 +145,7 @@ def _curve(
     chosen: set[int],
     numbers: np.ndarray,
     edges: np.ndarray,
-    look: Look,
+    look: Style,
     place: int,
 ) -> None:
     rows = found.episodes[found.episodes["controller"] == name]
@@ -186,7 +186,7 @@ def _groups(found: Multiverse, by: Factor | None) -> dict[str, set[int]]:
 
 
 def _effects(found: Multiverse) -> str:
-    factors, shown = found.design.factors, looks(found.controllers)
+    factors, shown = found.design.factors, styles(found.controllers)
     chart = _blank("Rank correlation of each factor with survival", Axis("", -1.0, 1.0), len(factors),
                    "rank correlation with survival")  # fmt: skip
     chance = float("nan")
@@ -225,7 +225,7 @@ def _trees(found: Multiverse) -> list[str]:
     return drawn or [paragraph("Almost all worlds agree: there is nothing to decide.", "soft")]
 
 
-def _tree(decided: Deciding, factors: Sequence[Factor], shown: Mapping[str, Look]) -> str:
+def _tree(decided: Deciding, factors: Sequence[Factor], shown: Mapping[str, Style]) -> str:
     rows = list(_lines(decided.tree, factors, "all worlds", 0))
     chart = Chart("A tree of what decides", Axis("", 0.0, 100.0), Axis("", 0.0, float(len(rows))), WIDE,
                   len(rows) * ROW + 52, frame=False)  # fmt: skip

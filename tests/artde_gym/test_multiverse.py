@@ -44,7 +44,7 @@ BIPED: dict[str, Any] = {
     "set": {"disturbances.grf_pulse.shape": "double_hump"},
     "controllers": ["tde", "artde"],
     "matched": "artde",
-    "backend": "batch",
+    "vectorized": True,
     "worlds": 4,
     "seed": 11,
     "factors": {
@@ -52,7 +52,7 @@ BIPED: dict[str, Any] = {
         "period": {"path": "env_kwargs.control_period", "choice": [0.003, 0.004], "unit": "s", "source": "a guess"},
         "ahead": {"path": "disturbances.payload.position.0", "uniform": [-0.03, 0.03], "source": "a guess"},
         "payload": {"path": "disturbances.payload.mass", "uniform": [0.5, 2.0], "source": "a guess"},
-        "mass": {"path": "disturbances.mass_error.factor", "uniform": [0.9, 1.1], "source": "a guess"},
+        "mass": {"path": "disturbances.mass_scale.factor", "uniform": [0.9, 1.1], "source": "a guess"},
         "gamma": {
             "path": ["gains.artde.gamma_0", "gains.artde.gamma_1"],
             "log_uniform": [100.0, 2000.0],
@@ -66,13 +66,13 @@ QUADROTOR: dict[str, Any] = {
     "env_kwargs": {"duration": 2.0},
     "controllers": ["tde", "artde"],
     "matched": "artde",
-    "backend": "batch",
+    "vectorized": True,
     "worlds": 3,
     "seed": 11,
     "factors": {
         "wind": {"path": "disturbances.wind.scale", "uniform": [0.0, 2.0], "source": "a guess"},
         "measurement": {"path": "env_kwargs.measurement", "choice": ["ideal", "mocap"], "source": "a guess"},
-        "delay": {"path": "disturbances.torque_delay.samples", "choice": [0, 1], "source": "a guess"},
+        "delay": {"path": "disturbances.action_delay.steps", "choice": [0, 1], "source": "a guess"},
     },
     "claims": [{"order": ["tde", "artde"]}],
 }
@@ -109,7 +109,7 @@ def quadrotor(tmp_path_factory) -> Any:
         ({"claims": [{"survives": ["tde", "pid"]}]}, "controller of the claim"),
         ({"claims": [{"wins": ["tde", "artde"]}]}, "one of the keys survives"),
         ({"worlds": 0}, "worlds is 0"),
-        ({"backend": "batches"}, "did you mean 'batch'"),
+        ({"vectorized": "batches"}, "did you mean 'batch'"),
         ({"env": None}, "neither env nor scenario"),
         ({"figure": ["y"]}, "one or two of the factors: x"),
         ({"set": {"disturbances.payload.mass": 1.0}}, "with a scenario, or with disturbances"),
@@ -130,10 +130,12 @@ def test_a_wrong_design_is_refused_in_one_line_before_anything_is_written(tmp_pa
 
 def test_what_an_environment_refuses_shows_before_the_first_episode(tmp_path):
     factors = {"payload": {"path": "disturbances.payload.mass", "uniform": [4.0, 50.0], "source": "too much"}}
-    for backend in ("single", "batch"):
+    for vectorized in (False, True):
         with pytest.raises(ArtdeGymError, match=r"payload.mass is .*; allowed: .*5"):
-            multiverse({**SMALL, "disturbances": {}, "factors": factors, "backend": backend}, tmp_path / backend)
-        assert not (tmp_path / backend).exists()
+            multiverse(
+                {**SMALL, "disturbances": {}, "factors": factors, "vectorized": vectorized}, tmp_path / vectorized
+            )
+        assert not (tmp_path / vectorized).exists()
 
 
 def test_an_unknown_design_names_the_standard_ones():
@@ -185,7 +187,7 @@ def test_worlds_side_by_side_are_those_of_evaluate_one_at_a_time(biped, quadroto
 
 
 def test_worlds_of_a_batch_are_those_of_single_environments(biped):
-    line = biped.command(1, ("artde",))[0].replace("--backend batch", "--backend single")
+    line = biped.command(1, ("artde",))[0].replace("--vectorized", "--vectorized single")
     same_episode(episode(biped, 1, "artde"), run_again(line).iloc[0])
 
 
@@ -217,7 +219,7 @@ def run_again(line: str) -> pd.DataFrame:
         scenario=given["--scenario"],
         episodes=int(given["--episodes"]),
         seed=int(given["--seed"]),
-        backend=given["--backend"],  # pyright: ignore[reportArgumentType]
+        vectorized=given["--vectorized"],  # pyright: ignore[reportArgumentType]
         env_kwargs=read["env-kwargs"],
         gains=read["gains"],
         disturbances=json.loads(given["--disturbances"]),
@@ -431,7 +433,7 @@ ENGINE = {"BipedWalk-Payload-v0": "mujoco", "QuadInfinity-Payload-v0": "numpy"}
 
 def test_each_environment_of_a_vector_may_have_disturbances_of_its_own():
     env: Any = gym.make_vec("BipedWalk-Payload-v0", 3, vectorization_mode="vector_entry_point", engine="mujoco")
-    rows = [{"payload": 1.0}, {"friction": 0.5, "mass_error": 1.1}, {}]
+    rows = [{"payload": 1.0}, {"friction": 0.5, "mass_scale": 1.1}, {}]
     env.reset(seed=0, options={"disturbances": rows})
     assert [set(sampled) for sampled in env.unwrapped.sampled_disturbances] == [set(row) for row in rows]
     env.reset(seed=0)  # they stay

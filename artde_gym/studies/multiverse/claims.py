@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from artde_gym.arrays import Array
-from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from artde_gym.registry import Registry
 
 Outcome = Literal["holds", "tie", "reverses"]
@@ -65,7 +65,7 @@ class WorldTable:
             UnknownNameError: if there is none of this name.
         """
         if name not in self._rows:
-            raise UnknownNameError("metric", name, among(name, [str(column) for column in self._rows]))
+            raise UnknownNameError("metric", name, suggest_names(name, [str(column) for column in self._rows]))
         return self._rows.pivot(index="world", columns="controller", values=name).reindex(columns=self._names)
 
 
@@ -193,7 +193,7 @@ def _read(entry: Any, controllers: Sequence[str]) -> WorldClaim:
     claim = KINDS[kind](content)
     for name in claim.controllers:
         if name not in controllers:
-            raise OptionError(f"controller of the claim {claim.text!r}", name, among(name, controllers))
+            raise OptionError(f"controller of the claim {claim.text!r}", name, suggest_names(name, controllers))
     return claim
 
 

@@ -7,7 +7,7 @@
     matched: artde                     # then TDE at this law's mean gain of the same world, as "matched"
     worlds: 400
     seed: 0
-    backend: batch
+    vectorized: batch
     factors:
       ground force:
         path: disturbances.grf_pulse.share             # or a list of paths, which all get the value
@@ -30,10 +30,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, get_args
 
-from artde_gym.arguments import whole
-from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.arguments import check_integer
+from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from artde_gym.evaluation import canonical
-from artde_gym.evaluation.environments import Backend, robot_of, tracking_of
+from artde_gym.evaluation.environments import metrics_spec_of, robot_of
 from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.kit import ROBOTS
 from artde_gym.registration import registered_controllers
@@ -43,7 +43,7 @@ from artde_gym.studies.multiverse.factor import Factor, sample
 from artde_gym.studies.reproduce.reproduction import ABLATION
 from artde_gym.studies.sweep.design import (
     SETTINGS,
-    Point,
+    SweepCell,
     check_path,
     check_plain,
     check_setting,
@@ -53,7 +53,7 @@ from artde_gym.studies.sweep.design import (
 )
 
 FIXED = ("env", "scenario", "disturbances", "env_kwargs", "gains")
-KEYS = (*FIXED, "set", "controllers", "matched", "worlds", "seed", "backend", "factors", "claims", "figure")
+KEYS = (*FIXED, "set", "controllers", "matched", "worlds", "seed", "vectorized", "factors", "claims", "figure")
 MATCHED = "matched"
 """Label of the second pass: the ablation at the adaptive law's mean gain of the same world."""
 MOST_WORLDS = 100_000
@@ -82,7 +82,7 @@ class Design:
     controllers: tuple[str, ...]
     matched: str | None
     worlds: tuple[World, ...]
-    backend: Backend
+    vectorized: bool
     factors: tuple[Factor, ...]
     claims: tuple[WorldClaim, ...]
     figure: tuple[Factor, Factor | None]
@@ -101,9 +101,9 @@ class Design:
     @property
     def main(self) -> str:
         """Name of the metric that is the main error."""
-        return f"rmse_{tracking_of(self.env_id).errors[0].unit}"
+        return f"rmse_{metrics_spec_of(self.env_id).errors[0].unit}"
 
-    def points(self) -> dict[tuple[int, str], Point]:
+    def points(self) -> dict[tuple[int, str], SweepCell]:
         """Return what runs in the first pass, by world and controller.
 
         Raises:
@@ -111,17 +111,17 @@ class Design:
         """
         return {(world.number, name): self._point(world, name) for world in self.worlds for name in self.controllers}
 
-    def matched_point(self, number: int, gains: Mapping[str, float]) -> Point:
+    def matched_point(self, number: int, gains: Mapping[str, float]) -> SweepCell:
         """Return the second pass in one world."""
         point = self._point(self.worlds[number], ABLATION, {ABLATION: dict(gains)})
         return dataclasses.replace(point, controller=MATCHED, id=f"{point.id}-{MATCHED}")
 
-    def _point(self, world: World, name: str, gains: Mapping[str, Any] | None = None) -> Point:
+    def _point(self, world: World, name: str, gains: Mapping[str, Any] | None = None) -> SweepCell:
         paths = {path: world.factors[factor.name] for factor in self.factors for path in factor.paths}
         settings = settings_of({**self.fixed, "controller": name, "seed": world.seed}, paths)
         if gains is not None:
             settings["gains"] = gains
-        return point_of(settings, self.backend, {*self.controllers, ABLATION})
+        return point_of(settings, self.vectorized, {*self.controllers, ABLATION})
 
 
 def load(given: str | Path | Mapping[str, Any], *, engine: str | None = None, **replaced: Any) -> Design:
@@ -155,12 +155,12 @@ def design(given: Mapping[str, Any]) -> Design:
     check_plain("design", given)
     for key in given:
         if key not in KEYS:
-            raise OptionError("key of the design", key, among(key, KEYS))
-    backend = given.get("backend", "single")
-    if backend not in get_args(Backend):
-        raise OptionError("backend", backend, among(backend, get_args(Backend)))
-    count = whole("worlds", given.get("worlds", 100), 1, MOST_WORLDS)
-    seed = whole("seed", given.get("seed", 0), 0)
+            raise OptionError("key of the design", key, suggest_names(key, KEYS))
+    vectorized = given.get("vectorized", "single")
+    if vectorized not in get_args(Backend):
+        raise OptionError("vectorized", vectorized, suggest_names(vectorized, get_args(Backend)))
+    count = check_integer("worlds", given.get("worlds", 100), 1, MOST_WORLDS)
+    seed = check_integer("seed", given.get("seed", 0), 0)
     controllers, matched = _controllers(given)
     factors = _factors(given.get("factors"))
     fixed = _fixed(given)
@@ -169,7 +169,7 @@ def design(given: Mapping[str, Any]) -> Design:
     values = sample(factors, count, seed)
     worlds = tuple(World(i, values[i], episode_seed(seed, i)) for i in range(count))
     figure = _figure(given.get("figure"), factors)
-    return Design(fixed, controllers, matched, worlds, backend, factors, claims, figure, json.dumps(given))
+    return Design(fixed, controllers, matched, worlds, vectorized, factors, claims, figure, json.dumps(given))
 
 
 def _file(given: str | Path) -> Path:
@@ -177,7 +177,9 @@ def _file(given: str | Path) -> Path:
     if str(given) in standard:
         return standard[str(given)]
     if not Path(given).exists():
-        raise OptionError("design", str(given), f"a file, or a robot's standard design: {among(given, standard)}")
+        raise OptionError(
+            "design", str(given), f"a file, or a robot's standard design: {suggest_names(given, standard)}"
+        )
     return Path(given)
 
 
@@ -206,11 +208,11 @@ def _controllers(given: Mapping[str, Any]) -> tuple[tuple[str, ...], str | None]
     known = registered_controllers()
     for name in names:
         if name not in known:
-            raise UnknownNameError("controller", name, among(name, known))
+            raise UnknownNameError("controller", name, suggest_names(name, known))
     if again := canonical.twice(names):
         raise OptionError("controllers", again, "each name once")
     if matched is not None and matched not in names:
-        raise OptionError("matched", matched, f"one of the controllers: {among(matched, names)}")
+        raise OptionError("matched", matched, f"one of the controllers: {suggest_names(matched, names)}")
     return tuple(names), matched
 
 

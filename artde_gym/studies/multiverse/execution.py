@@ -14,7 +14,6 @@ from typing import Any
 
 import pandas as pd
 
-from artde_gym.evaluation.environments import Backend
 from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.rollout import Episode
 from artde_gym.evaluation.tasks import Progress, Update, labels_of
@@ -25,7 +24,7 @@ from artde_gym.studies.multiverse.result import Multiverse, read_multiverse
 from artde_gym.studies.reproduce.reproduction import mean_gains
 from artde_gym.studies.sweep import parquet
 from artde_gym.studies.sweep.design import Design as SweepDesign
-from artde_gym.studies.sweep.design import Point
+from artde_gym.studies.sweep.design import SweepCell
 from artde_gym.studies.sweep.execution import evidence_of, refuse_others
 from artde_gym.studies.sweep.store import SweepStore, read_sweep
 
@@ -40,7 +39,7 @@ def multiverse(
     *,
     worlds: int | None = None,
     seed: int | None = None,
-    backend: Backend | None = None,
+    vectorized: bool | None = None,
     engine: str | None = None,
     workers: int = 1,
     allow_mixed: bool = False,
@@ -51,7 +50,7 @@ def multiverse(
     Args:
         design: a robot with a standard design, a YAML file, or its content; see `artde_gym.studies.multiverse.design`.
         out: folder of the results. The same call continues after whatever happened; more worlds are added.
-        worlds, seed, backend: in place of the design's. Fewer worlds of the same seed are the first of them.
+        worlds, seed, vectorized: in place of the design's. Fewer worlds of the same seed are the first of them.
         engine: physics engine of the environments, in place of the design's.
         workers: processes; the results do not depend on it.
         allow_mixed: as for `evaluate`.
@@ -67,14 +66,14 @@ def multiverse(
     """
     check_workers(workers)
     parquet.pyarrow()
-    plan = load(design, engine=engine, worlds=worlds, seed=seed, backend=backend)
+    plan = load(design, engine=engine, worlds=worlds, seed=seed, vectorized=vectorized)
     first = plan.points()
     if workers > 1:
         check_picklable({point.controller: point.spec for point in first.values()}, {})
     complete = True
     with SweepStore(Path(out)) as store:
         known = {**first, **_second_pass(plan, _stored(store))}
-        as_sweep = SweepDesign(tuple(known.values()), 1, plan.backend, plan.text)
+        as_sweep = SweepDesign(tuple(known.values()), 1, plan.vectorized, plan.text)
         refuse_others(as_sweep, store)
         _check(plan, first, store, on_progress)
         types = parquet.types_of(_columns(plan.worlds[number], point) for (number, _), point in known.items())
@@ -95,7 +94,7 @@ def _stored(store: SweepStore) -> pd.DataFrame:
     return read_sweep(store.folder) if store.done else pd.DataFrame({"controller": []})
 
 
-def _second_pass(plan: Design, episodes: pd.DataFrame) -> dict[tuple[int, str], Point]:
+def _second_pass(plan: Design, episodes: pd.DataFrame) -> dict[tuple[int, str], SweepCell]:
     """Return what the second pass runs, as far as the first one has come."""
     rows: pd.DataFrame = episodes.loc[episodes["controller"] == plan.matched]
     found = {}
@@ -108,7 +107,7 @@ def _second_pass(plan: Design, episodes: pd.DataFrame) -> dict[tuple[int, str], 
 
 
 def _check(
-    plan: Design, points: Mapping[tuple[int, str], Point], store: SweepStore, on_progress: OnProgress | None
+    plan: Design, points: Mapping[tuple[int, str], SweepCell], store: SweepStore, on_progress: OnProgress | None
 ) -> None:
     fresh = [(number, point) for (number, _), point in points.items() if (point.id, 0) not in store.done]
 
@@ -116,12 +115,12 @@ def _check(
         if on_progress is not None:
             on_progress("worlds checked", Update(job.task, 0.0, True, count, len(fresh)))
 
-    check_points(fresh, plan.backend, checked)
+    check_points(fresh, plan.vectorized, checked)
 
 
 def _run(
     plan: Design,
-    points: Mapping[tuple[int, str], Point],
+    points: Mapping[tuple[int, str], SweepCell],
     store: SweepStore,
     workers: int,
     on_progress: Callable[[Update], None] | None,
@@ -134,7 +133,7 @@ def _run(
         store.due()
         progress.running(job.task, time)
 
-    runs = run_jobs(run, jobs_of(left, plan.backend), min(workers, max(len(left), 1)), on_time)
+    runs = run_jobs(run, jobs_of(left, plan.vectorized), min(workers, max(len(left), 1)), on_time)
     try:
         for job, results in runs:
             store.add(_rows(plan, job, results))
@@ -152,7 +151,7 @@ def _rows(plan: Design, job: Job, results: list[Episode]) -> Iterator[dict[str, 
         yield {**labels, **_columns(plan.worlds[job.task.episodes[i]], point), **result.row}
 
 
-def _columns(world: World, point: Point) -> dict[str, Any]:
+def _columns(world: World, point: SweepCell) -> dict[str, Any]:
     """Return the columns that say which world it is."""
     return {
         **point.columns,

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from artde_gym.arrays import Array
-from artde_gym.errors import OptionError, among
+from artde_gym.errors import OptionError, suggest_names
 from artde_gym.studies.sweep.design import check_distribution, check_path, is_number
 
 DISTRIBUTIONS = ("uniform", "log_uniform", "quantiles", "choice")
@@ -51,7 +51,7 @@ class Factor:
             raise OptionError(field, given, f"a mapping with the keys {', '.join(KEYS)}")
         for key in given:
             if key not in KEYS:
-                raise OptionError(f"key of {field}", key, among(key, KEYS))
+                raise OptionError(f"key of {field}", key, suggest_names(key, KEYS))
         kinds = [kind for kind in DISTRIBUTIONS if kind in given]
         if len(kinds) != 1:
             raise OptionError(field, kinds, f"exactly one of {', '.join(DISTRIBUTIONS)}")

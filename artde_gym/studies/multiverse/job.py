@@ -7,9 +7,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 from artde_gym.errors import ArtdeGymError
-from artde_gym.evaluation.batch import run_batch
-from artde_gym.evaluation.cells import Cell, tried, vector_of
-from artde_gym.evaluation.environments import Backend
+from artde_gym.evaluation.vector_rollout import run_vector
+from artde_gym.evaluation.cells import Cell, validate_cell, vector_of
 from artde_gym.evaluation.gains import policy_for
 from artde_gym.evaluation.registered import METRICS, require_metrics
 from artde_gym.evaluation.rollout import Episode, Policy
@@ -17,12 +16,12 @@ from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.evaluation.side_by_side import SideBySide
 from artde_gym.evaluation.tasks import Task, run_task
 from artde_gym.registration import ControllerSpec
-from artde_gym.studies.sweep.design import Point
+from artde_gym.studies.sweep.design import SweepCell
 
 MOST = 200
 """Episodes at most that run side by side: more would be hardly faster, and a job is what a kill may cost."""
 
-Numbered = tuple[int, Point]
+Numbered = tuple[int, SweepCell]
 """A world's number, and what runs in it."""
 
 
@@ -30,23 +29,23 @@ class Job(NamedTuple):
     """Episodes that run at once; `task` is what they share, `options` those of the reset with what they do not."""
 
     task: Task
-    points: tuple[Point, ...]
+    points: tuple[SweepCell, ...]
     options: dict[str, Any] | None
 
 
-def jobs_of(points: Iterable[Numbered], backend: Backend) -> Iterator[Job]:
+def jobs_of(points: Iterable[Numbered], vectorized: bool) -> Iterator[Job]:
     """Put what is left to run into jobs: in batches all controllers and worlds that share an environment."""
     groups: dict[str, list[Numbered]] = {}
     for number, point in points:
         alone = [number, point.controller]
-        place = alone if backend == "single" else [point.cell.env_id, _shared(point).kwargs]
+        place = alone if not vectorized else [point.cell.env_id, _shared(point).kwargs]
         groups.setdefault(json.dumps(place), []).append((number, point))
     for group in groups.values():
         for first in range(0, len(group), MOST):
-            yield _job(group[first : first + MOST], backend)
+            yield _job(group[first : first + MOST], vectorized)
 
 
-def check_points(points: Sequence[Numbered], backend: Backend, on_checked: Callable[[Job, int], None]) -> None:
+def check_points(points: Sequence[Numbered], vectorized: bool, on_checked: Callable[[Job, int], None]) -> None:
     """Build everything once, so that a bad world shows before the first episode.
 
     Raises:
@@ -54,12 +53,12 @@ def check_points(points: Sequence[Numbered], backend: Backend, on_checked: Calla
     """
     env: Any = None
     last, count = "", 0
-    for job in jobs_of(points, backend):
+    for job in jobs_of(points, vectorized):
         place = json.dumps([job.task.cell.kwargs, job.options])
         if place != last:
             last = place
-            env = tried(backend, job.task.cell) if backend == "single" else _vector(job)
-            if backend == "batch":
+            env = validate_cell(vectorized, job.task.cell) if not vectorized else _vector(job)
+            if vectorized:
                 env.reset(seed=0, options=job.options)
         for point in job.points:
             policy_for(point.spec, env, point.gains)
@@ -70,7 +69,7 @@ def check_points(points: Sequence[Numbered], backend: Backend, on_checked: Calla
 def run(job: Job, on_time: Callable[[float], None]) -> list[Episode]:
     """Run a job; what goes wrong is told with the worlds."""
     try:
-        return run_task(job.task, on_time) if job.task.backend == "single" else _run_batch(job, on_time)
+        return run_task(job.task, on_time) if job.task.not vectorized else _run_batch(job, on_time)
     except ArtdeGymError as error:
         worlds = f"{job.task.controller} in world {', '.join(map(str, job.task.episodes))}"
         raise type(error)(f"{error.field} ({worlds})", error.value, error.allowed) from error
@@ -85,10 +84,10 @@ def _run_batch(job: Job, on_time: Callable[[float], None]) -> list[Episode]:
         if (key := _key(point)) not in made:
             made[key] = policy_for(point.spec, env, point.gains)
     policy = SideBySide([made[_key(point)] for point in job.points], [point.spec.name for point in job.points])
-    return run_batch(env, policy, task.seeds, options=job.options, phases=task.cell.phases, on_progress=on_time)
+    return run_vector(env, policy, task.seeds, options=job.options, phases=task.cell.phases, on_progress=on_time)
 
 
-def _key(point: Point) -> str:
+def _key(point: SweepCell) -> str:
     return json.dumps([point.spec.name, point.gains])
 
 
@@ -96,21 +95,21 @@ def _vector(job: Job) -> Any:
     return vector_of(job.task.cell, len(job.points))
 
 
-def _job(group: Sequence[Numbered], backend: Backend) -> Job:
+def _job(group: Sequence[Numbered], vectorized: bool) -> Job:
     numbers, points = zip(*group, strict=True)
     first = points[0]
     spec: ControllerSpec = first.spec
-    cell = first.cell if backend == "single" else _shared(first)
+    cell = first.cell if not vectorized else _shared(first)
     seeds = [episode_seed(point.seed, 0) for point in points]
     names = ", ".join(dict.fromkeys(point.controller for point in points))
     task = Task(
-        backend, cell, names, spec, first.gains, list(numbers), seeds, 100.0, 0, tuple(METRICS)
+        vectorized, cell, names, spec, first.gains, list(numbers), seeds, 100.0, 0, tuple(METRICS)
     )  # fmt: skip
     own = [point.cell.kwargs["disturbances"] for point in points if "disturbances" in point.cell.kwargs]
     return Job(task, tuple(points), {"disturbances": own} if own else None)
 
 
-def _shared(point: Point) -> Cell:
+def _shared(point: SweepCell) -> Cell:
     """Return the cell without disturbances, in which worlds of a batch may differ; those of its own it keeps."""
     if "disturbances" not in point.cell.kwargs:
         return point.cell

@@ -133,7 +133,7 @@ class Multiverse:
                 gains[name] = own
         words = ["artde-gym", "evaluate", "--controllers", ",".join(names), "--env", rows[0]["env"]]
         words += ["--scenario", rows[0]["scenario"], "--episodes", "1", "--seed", str(self.design.worlds[world].seed)]
-        words += ["--backend", self.design.backend]
+        words += ["--vectorized", self.design.vectorized]
         words += ["--env-kwargs", json.dumps(kwargs)] if kwargs else []
         words += ["--disturbances", rows[0]["disturbances"]] if "disturbances" in rows[0] else []
         words += ["--gains", json.dumps(gains)] if gains else []
