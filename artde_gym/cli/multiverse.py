@@ -21,7 +21,7 @@ def multiverse(
     out: Annotated[Path | None, typer.Option(help="Results folder. Default: runs/multiverse-<design>.")] = None,
     workers: Workers = None,
     vectorized: Annotated[
-        str | None, typer.Option(help="single, or batch: worlds side by side. Default: the design's.")
+        bool | None, typer.Option(help="Worlds side by side, or one by one. Default: the design's.")
     ] = None,
     engine: Engine = None,
     allow_mixed: AllowMixed = False,
@@ -35,7 +35,7 @@ def multiverse(
             out or Path("runs") / f"multiverse-{Path(design).stem}",
             worlds=worlds,
             seed=seed,
-            vectorized=vectorized,  # pyright: ignore[reportArgumentType]  # checked there
+            vectorized=vectorized,
             engine=engine,
             workers=processes(workers),
             allow_mixed=allow_mixed,

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from artde_gym.arrays import Array
+from artde_gym.deprecation import renamed_arguments
 from artde_gym.errors import OptionError
 from artde_gym.kit import ROBOTS, Capability
 from artde_gym.registry import Registry
@@ -53,6 +54,7 @@ A value is (n,), or (n, size); a word is its place among those allowed. The func
 """
 
 
+@renamed_arguments({"words": "choices"})
 @dataclasses.dataclass(frozen=True)
 class Parameter:
     """One value of a disturbance.
@@ -78,6 +80,7 @@ class Parameter:
     choices: tuple[str, ...] | str = ()
 
 
+@renamed_arguments({"repeated": "multiple", "scalar": "shorthand"})
 @dataclasses.dataclass(frozen=True)
 class DisturbanceSpec:
     """A disturbance by name.

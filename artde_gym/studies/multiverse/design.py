@@ -7,7 +7,7 @@
     matched: artde                     # then TDE at this law's mean gain of the same world, as "matched"
     worlds: 400
     seed: 0
-    vectorized: batch
+    vectorized: true
     factors:
       ground force:
         path: disturbances.grf_pulse.share             # or a list of paths, which all get the value
@@ -28,9 +28,9 @@ import dataclasses
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
-from artde_gym.arguments import check_integer
+from artde_gym.arguments import check_bool, check_integer
 from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from artde_gym.evaluation import canonical
 from artde_gym.evaluation.environments import metrics_spec_of, robot_of
@@ -156,9 +156,7 @@ def design(given: Mapping[str, Any]) -> Design:
     for key in given:
         if key not in KEYS:
             raise OptionError("key of the design", key, suggest_names(key, KEYS))
-    vectorized = given.get("vectorized", "single")
-    if vectorized not in get_args(Backend):
-        raise OptionError("vectorized", vectorized, suggest_names(vectorized, get_args(Backend)))
+    vectorized = check_bool("vectorized", given.get("vectorized", False))
     count = check_integer("worlds", given.get("worlds", 100), 1, MOST_WORLDS)
     seed = check_integer("seed", given.get("seed", 0), 0)
     controllers, matched = _controllers(given)

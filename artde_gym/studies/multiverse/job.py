@@ -38,7 +38,7 @@ def jobs_of(points: Iterable[Numbered], vectorized: bool) -> Iterator[Job]:
     groups: dict[str, list[Numbered]] = {}
     for number, point in points:
         alone = [number, point.controller]
-        place = alone if not vectorized else [point.cell.env_id, _shared(point).kwargs]
+        place = [point.cell.env_id, _shared(point).kwargs] if vectorized else alone
         groups.setdefault(json.dumps(place), []).append((number, point))
     for group in groups.values():
         for first in range(0, len(group), MOST):
@@ -57,7 +57,7 @@ def check_points(points: Sequence[Numbered], vectorized: bool, on_checked: Calla
         place = json.dumps([job.task.cell.kwargs, job.options])
         if place != last:
             last = place
-            env = validate_cell(vectorized, job.task.cell) if not vectorized else _vector(job)
+            env = _vector(job) if vectorized else validate_cell(vectorized, job.task.cell)
             if vectorized:
                 env.reset(seed=0, options=job.options)
         for point in job.points:
@@ -69,7 +69,7 @@ def check_points(points: Sequence[Numbered], vectorized: bool, on_checked: Calla
 def run(job: Job, on_time: Callable[[float], None]) -> list[Episode]:
     """Run a job; what goes wrong is told with the worlds."""
     try:
-        return run_task(job.task, on_time) if job.task.not vectorized else _run_batch(job, on_time)
+        return _run_batch(job, on_time) if job.task.vectorized else run_task(job.task, on_time)
     except ArtdeGymError as error:
         worlds = f"{job.task.controller} in world {', '.join(map(str, job.task.episodes))}"
         raise type(error)(f"{error.field} ({worlds})", error.value, error.allowed) from error
@@ -99,7 +99,7 @@ def _job(group: Sequence[Numbered], vectorized: bool) -> Job:
     numbers, points = zip(*group, strict=True)
     first = points[0]
     spec: ControllerSpec = first.spec
-    cell = first.cell if not vectorized else _shared(first)
+    cell = _shared(first) if vectorized else first.cell
     seeds = [episode_seed(point.seed, 0) for point in points]
     names = ", ".join(dict.fromkeys(point.controller for point in points))
     task = Task(

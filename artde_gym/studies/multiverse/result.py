@@ -133,7 +133,7 @@ class Multiverse:
                 gains[name] = own
         words = ["artde-gym", "evaluate", "--controllers", ",".join(names), "--env", rows[0]["env"]]
         words += ["--scenario", rows[0]["scenario"], "--episodes", "1", "--seed", str(self.design.worlds[world].seed)]
-        words += ["--vectorized", self.design.vectorized]
+        words += ["--vectorized"] if self.design.vectorized else []
         words += ["--env-kwargs", json.dumps(kwargs)] if kwargs else []
         words += ["--disturbances", rows[0]["disturbances"]] if "disturbances" in rows[0] else []
         words += ["--gains", json.dumps(gains)] if gains else []
