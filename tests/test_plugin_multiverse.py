@@ -39,5 +39,5 @@ def test_the_arm_goes_through_a_multiverse(tmp_path: Path) -> None:
     assert sorted(zip(rows["world"], rows["controller"], strict=True)) == [
         (world, name) for world in range(3) for name in ("artde", "tde")
     ]
-    assert rows["factor.payload"].nunique() == 3
+    assert len(set(rows["factor.payload"])) == 3
     assert "what it may carry" in (tmp_path / "run/report.html").read_text()

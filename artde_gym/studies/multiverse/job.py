@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 from artde_gym.errors import ArtdeGymError
-from artde_gym.evaluation.vector_rollout import run_vector
 from artde_gym.evaluation.cells import Cell, validate_cell, vector_of
 from artde_gym.evaluation.gains import policy_for
 from artde_gym.evaluation.registered import METRICS, require_metrics
@@ -15,6 +14,7 @@ from artde_gym.evaluation.rollout import Episode, Policy
 from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.evaluation.side_by_side import SideBySide
 from artde_gym.evaluation.tasks import Task, run_task
+from artde_gym.evaluation.vector_rollout import run_vector
 from artde_gym.registration import ControllerSpec
 from artde_gym.studies.sweep.design import SweepCell
 

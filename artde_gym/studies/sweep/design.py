@@ -314,7 +314,7 @@ def _vector(settings: Mapping[str, Any], given: Mapping[str, Any], kind: str, na
     known = DISTURBANCES[kind]
     (parameter,) = (one for one in known.parameters if one.name == name)
     default = known.default_of(parameter, robot_of(env_id))
-    return default if known.repeated else parameters_of(kind, given.get(kind)).get(name, default)
+    return default if known.multiple else parameters_of(kind, given.get(kind)).get(name, default)
 
 
 def _with_component(vector: Any, path: str, component: str, value: Any) -> list[Any]:
