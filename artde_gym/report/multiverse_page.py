@@ -260,14 +260,19 @@ def _condition(factor: Factor, sign: str, threshold: float) -> str:
 
 def _importance(found: Multiverse, decided: Deciding) -> str:
     rows = [
-        [factor.name, Cell(f"{100 * value:+.1f}", value)]
-        for factor, value in sorted(
-            zip(found.design.factors, decided.importance.tolist(), strict=True), key=lambda pair: -pair[1]
+        [factor.name, Cell(f"{100 * value:+.1f}", value), Cell(f"{100 * error:.1f}", error)]
+        for factor, value, error in sorted(
+            zip(found.design.factors, decided.importance.tolist(), decided.spread.tolist(), strict=True),
+            key=lambda row: -row[1],
         )
         if abs(value) > 0.002
     ]
     return (
-        table("Points of accuracy that are lost where a factor is permuted", ["factor", "points"], rows) if rows else ""
+        table(
+            "Points of accuracy that are lost where a factor is permuted", ["factor", "points", "standard error"], rows
+        )
+        if rows
+        else ""
     )
 
 

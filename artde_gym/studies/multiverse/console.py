@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+import numpy as np
 from rich import box
 from rich.console import Console
 from rich.table import Table
@@ -17,7 +18,10 @@ from artde_gym.studies.multiverse.deciding import Deciding
 from artde_gym.studies.multiverse.result import Multiverse
 
 TOLD = 0.01
-"""Share of the worlds by which a factor, or a tree, must tell more than without it to be named."""
+"""Share of the worlds by which a tree, or a factor in it, must tell more than without it to be named.
+
+A factor's share must be two standard errors, too: of fifteen without any effect, some go along by chance.
+"""
 
 
 def print_multiverse(found: Multiverse, console: Console) -> None:
@@ -88,8 +92,8 @@ def all_deciding(found: Multiverse) -> Iterator[tuple[str, Deciding | None]]:
 
 def deciding_text(found: Multiverse, decided: Deciding) -> str:
     """Say which factors decide, the most important one first, and how well they tell."""
-    order = decided.importance.argsort()[::-1]
-    names = [found.design.factors[i].name for i in order if decided.importance[i] > TOLD]
+    clear = decided.importance > np.maximum(TOLD, 2 * decided.spread)
+    names = [found.design.factors[i].name for i in decided.importance.argsort()[::-1] if clear[i]]
     right = f"a tree is right in {100 * decided.accuracy:.0f} %, always the commonest in {100 * decided.baseline:.0f} %"
     known = decided.accuracy > decided.baseline + TOLD and names
     return f"decided by {', then '.join(names)} ({right})" if known else f"no factor tells ({right})"

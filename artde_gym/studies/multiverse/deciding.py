@@ -46,6 +46,7 @@ class Deciding:
         accuracy: share of worlds whose class a tree predicts that was made without them.
         baseline: share of the most frequent class, which needs no tree.
         importance: of each factor, by how much of the accuracy is lost where its values are permuted.
+        spread: standard errors of these, over the folds.
         tree: made from all worlds.
     """
 
@@ -53,6 +54,7 @@ class Deciding:
     accuracy: float
     baseline: float
     importance: Array
+    spread: Array
     tree: Node
 
 
@@ -86,7 +88,8 @@ def what_decides(factors: Array, classes: Sequence[str]) -> Deciding | None:
     whole = fitted(np.arange(len(y)))
     baseline = float(counts[counts >= FOLDS].max() / len(y))
     kinds = tuple(str(name) for name in whole.classes_)
-    return Deciding(kinds, float(np.mean(accuracy)), baseline, np.mean(lost, axis=0), _node(whole, x, y, kinds))
+    spread = np.std(lost, axis=0, ddof=1) / np.sqrt(FOLDS)
+    return Deciding(kinds, float(np.mean(accuracy)), baseline, np.mean(lost, axis=0), spread, _node(whole, x, y, kinds))
 
 
 def rank_correlations(factors: Array, values: Array) -> tuple[Array, float]:
