@@ -35,14 +35,14 @@ ENDED: dict[str, Style] = {FATES[False]: SHOWN["holds"], FATES[True]: SHOWN["rev
 
 
 def answer(found: Multiverse) -> tuple[str, list[str]]:
-    """A headline, and a sentence on each claim."""
+    """Write a headline, and a sentence on each claim."""
     shares = ", ".join(f"{name} {100 * found.survival(name).value:.0f} %" for name in found.controllers)
     head = f"Without a fall in {len(set(found.episodes['world']))} plausible worlds: {shares}."
     return head, [_sentence(verdict) for verdict in found.verdicts]
 
 
 def parts(found: Multiverse) -> Iterator[tuple[str, list[str]]]:
-    """Sections: a title, and what stands below it."""
+    """Yield the sections: a title, and what stands below it."""
     yield "Claims", [_verdict_bars(found.verdicts), _claims(found)]
     yield "Survival", [_survival(found), _curves(found)]
     yield "Factors", [_effects(found), *_trees(found)]
@@ -61,7 +61,7 @@ def _sentence(verdict: Verdict) -> str:
 
 
 def _blank(name: str, x: Axis, rows: int, foot: str = "") -> Chart:
-    """A chart of rows, the first one on top, without axes of numbers on the left."""
+    """Make a chart of rows, the first one on top, without axes of numbers on the left."""
     height = rows * ROW + 52
     chart = Chart(name, x, Axis("", 0.0, float(rows)), WIDE, height, frame=False)
     for tick in x.ticks():
@@ -120,7 +120,7 @@ def _survival(found: Multiverse) -> str:
 
 
 def _curves(found: Multiverse) -> str:
-    """Survival against one factor, a chart for each value of another."""
+    """Draw survival against one factor, a chart for each value of another."""
     along, by = found.design.figure
     shown = styles(found.controllers)
     numbers = along.numbers(_values(found, along))
@@ -170,7 +170,7 @@ def _values(found: Multiverse, factor: Factor) -> list[object]:
 
 
 def _groups(found: Multiverse, by: Factor | None) -> dict[str, set[int]]:
-    """Worlds by the value of a factor, or by thirds of its range."""
+    """Group worlds by the value of a factor, or by thirds of its range."""
     if by is None:
         return {"": {world.number for world in found.design.worlds}}
     values = _values(found, by)
@@ -211,7 +211,7 @@ def _effects(found: Multiverse) -> str:
 
 
 def _trees(found: Multiverse) -> list[str]:
-    """What decides about survival and about each claim, a tree each; the first one open."""
+    """Draw what decides about survival and about each claim, a tree each; the first one open."""
     drawn: list[str] = []
     try:
         for what, decided in all_deciding(found):
@@ -240,7 +240,7 @@ def _tree(decided: Deciding, factors: Sequence[Factor], shown: Mapping[str, Styl
 
 
 def _lines(node: Node, factors: Sequence[Factor], text: str, depth: int) -> Iterator[tuple[int, str, tuple[int, ...]]]:
-    """Nodes from the root on, each with its depth, its condition and its counts."""
+    """Yield nodes from the root on, each with its depth, its condition and its counts."""
     yield depth, text, node.counts
     if node.factor is None or node.below is None or node.above is None:
         return
@@ -310,7 +310,7 @@ def _histogram(head: str, ratios: np.ndarray) -> str:
 
 
 def _ends(found: Multiverse, verdict: Verdict) -> str:
-    """Commands for the two ends of a claim."""
+    """Show commands for the two ends of a claim."""
     if verdict.most_favorable is None or verdict.least_favorable is None:
         return ""
     shown = []
