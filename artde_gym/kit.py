@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple
 
@@ -144,6 +145,7 @@ class RobotKit:
             figures that all robots have.
         scene: "module:function" that is called with an environment's arguments and returns the
             `artde_gym.motion.scene.Scene` that replays show; None to make one of a model that is a `RobotSpec`.
+        multiverse: file of its standard design of plausible worlds; None if it has none.
     """
 
     name: str
@@ -161,6 +163,7 @@ class RobotKit:
     push: Push | None = None
     report: str | None = None
     scene: str | None = None
+    multiverse: Path | None = None
 
     @property
     def sites(self) -> tuple[str, ...]:

@@ -23,6 +23,9 @@ class LawPolicy(TrackingPolicy):
         self._period = time_base * interface.control_period
         super().__init__(name, interface, convert(gains, self._period))
 
+    def law(self) -> tuple[str, float]:
+        return self.name, self._period
+
     def start(self, signals: JointInput) -> LawState:
         return self._law.start(self.gains, signals, self._period)
 

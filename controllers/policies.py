@@ -7,6 +7,8 @@ arrays with the observations' leading axes, so that one policy object serves any
 from __future__ import annotations
 
 import abc
+import copy
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from artde_gym.errors import OptionError
 from artde_gym.layout import Layout
 from controllers.laws.tracking import Array, JointInput, LawState
+from controllers.stacked import stacked_gains
 
 
 class ControlInterface(NamedTuple):
@@ -106,6 +109,25 @@ class Policy(abc.ABC):
         force, state = self.step(state, signals, given)
         clipped = np.minimum(np.maximum(force, self._low), self._high)
         return clipped if clipped.dtype == force.dtype else clipped.astype(force.dtype), state
+
+    def law(self) -> tuple[str, float] | None:
+        """Return the law and the period L that it divides by (s); None where more than gains tells policies apart."""
+        return None
+
+    def stacked(self, policies: Sequence[Any]) -> Policy | None:
+        """Return one policy that drives each row of observations as the policy at its place would alone, bit for bit.
+
+        None where it cannot: the policies differ in more than gains, or in gains that a law takes one by one.
+        """
+        others = {(type(policy), policy.law()) for policy in policies if isinstance(policy, Policy)}
+        if self.law() is None or others != {(type(self), self.law())}:
+            return None
+        gains = stacked_gains([policy.gains for policy in policies])
+        if gains is None:
+            return None
+        whole = copy.copy(self)
+        whole.gains = gains
+        return whole
 
     def internals(self, state: LawState) -> dict[str, Array]:
         """Return the law's internal signals by name: sigma, s, beta, c, ..., as far as it has them."""

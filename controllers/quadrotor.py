@@ -66,6 +66,9 @@ class QuadrotorPolicy(Policy):
         e_q, e_w = attitude_errors(self.gains, state, signals)
         return {"e_q": e_q, "e_w": e_w}
 
+    def law(self) -> tuple[str, float]:
+        return self.name, self._period
+
     def start(self, signals: QuadrotorInput) -> LawState:
         return cascade_init(self._position, self._attitude, self.gains, signals, self._period)
 

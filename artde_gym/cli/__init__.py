@@ -16,6 +16,7 @@ from artde_gym.cli import (
     evaluate,
     frontier,
     listing,
+    multiverse,
     play,
     replay,
     report,
@@ -38,6 +39,7 @@ app.command()(evaluate.evaluate)
 app.command()(frontier.frontier)
 app.command()(tune.tune)
 app.command()(sweep.sweep)
+app.command()(multiverse.multiverse)
 app.command()(reproduce.reproduce)
 app.command()(train.train)
 app.command()(report.report)

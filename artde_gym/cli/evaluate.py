@@ -34,6 +34,7 @@ from artde_gym.cli.arguments import (
 from artde_gym.cli.display import Display, terminal
 from artde_gym.cli.report import show_report
 from artde_gym.evaluation import evaluate as run_evaluation
+from artde_gym.evaluation.cells import CUSTOM
 from artde_gym.evaluation.console import print_result
 from artde_gym.evaluation.environments import main_scenarios
 
@@ -43,7 +44,8 @@ def evaluate(
     scenario: Annotated[
         str | None,
         typer.Option(
-            help="Comma-separated names; see `list`. Default: the environment's main ones; if vectorized, the first."
+            help="Comma-separated names; see `list`. Default: the environment's main ones; if vectorized, the first; "
+            "custom: the environment as it is."
         ),
     ] = None,
     env: Annotated[str | None, typer.Option(help=f"Environment id. Default: the scenarios', or {WALK}.")] = None,
@@ -81,6 +83,8 @@ def evaluate(
         scenario = ",".join(main_scenarios(env)) or None
         if scenario is not None and vectorized:
             scenario = scenario.split(",")[0]
+    if scenario == CUSTOM:
+        scenario = None
     kwargs = environment_kwargs(env_kwargs, engine)
     folder = folder_of(out)
     console = terminal()

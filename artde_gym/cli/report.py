@@ -14,7 +14,9 @@ from artde_gym.cli.display import terminal
 
 
 def report(
-    folder: Annotated[Path, typer.Argument(help="Results folder of `evaluate`, `reproduce`, `frontier` or `train`.")],
+    folder: Annotated[
+        Path, typer.Argument(help="Results folder of `evaluate`, `reproduce`, `frontier`, `multiverse`, `train`.")
+    ],
     pictures: Pictures = False,
     videos: Videos = False,
 ) -> None:

@@ -185,6 +185,17 @@ class Chart:
         """Draw a thin line in the grid's style."""
         self._parts.append(f'<path class="grid" d="{_path(*self._points(x, y))}"/>')
 
+    def box(self, x: tuple[float, float], y: tuple[float, float], look: Style, text: str = "") -> None:
+        """Fill a rectangle between two values of each axis."""
+        (left, right), (bottom, top) = self._points(x, y)
+        outline = f"M{left:.1f} {bottom:.1f}H{right:.1f}V{top:.1f}H{left:.1f}z"
+        self._parts.append(f'<path class="box" style="--c:{look.color}" d="{outline}">{_title(text)}</path>')
+
+    def label(self, x: float, y: float, text: str) -> None:
+        """Write words that begin at a point."""
+        (across,), (up,) = self._points([x], [y])
+        self._parts.append(f'<text class="label" x="{across:.1f}" y="{up:.1f}">{escape(text)}</text>')
+
     def text(self, x: float, y: float, text: str) -> None:
         (across,), (up,) = self._points([x], [y])
         self._parts.append(f'<text x="{across:.1f}" y="{up:.1f}" text-anchor="middle">{escape(text)}</text>')

@@ -14,7 +14,7 @@ from artde_gym.errors import StoreError
 from artde_gym.evaluation.environments import physics_of, robot_of
 from artde_gym.evaluation.provenance import MIXED
 from artde_gym.evaluation.store import write_atomically
-from artde_gym.report import frontier_page, signals, tables, training_page
+from artde_gym.report import frontier_page, multiverse_page, signals, tables, training_page
 from artde_gym.report.answer import headline, sentences
 from artde_gym.report.html import bullets, page, paragraph, section
 from artde_gym.report.laws import Laws, unavailable
@@ -24,6 +24,7 @@ from artde_gym.report.robot import figures_of
 from artde_gym.report.run import Episode, Run
 from artde_gym.scenarios import SCENARIOS
 from artde_gym.studies.frontier.result import RECORD
+from artde_gym.studies.multiverse.result import last_run, read_multiverse
 
 NAME = "report.html"
 _LAST = ("Reference and loop", "Provenance")
@@ -32,10 +33,10 @@ _LAST = ("Reference and loop", "Provenance")
 def write_report(
     folder: str | Path, *, pictures: bool = False, videos: bool = False, on_progress: Progress = lambda _: None
 ) -> Path:
-    """Write the report of an evaluation, a frontier or a training into its folder, finished or interrupted.
+    """Write the report of an evaluation, a frontier, a multiverse or a training into its folder, finished or interrupted.
 
     Args:
-        folder: results folder of `evaluate`, `reproduce`, `frontier` or `train`.
+        folder: results folder of `evaluate`, `reproduce`, `frontier`, `multiverse` or `train`.
         pictures: whether to rerun an evaluation's shown episodes for snapshots of motion, pushes and falls.
         videos: whether to rerun them for a video of each scenario (about a megabyte each).
         on_progress: called with the figure being drawn.
@@ -48,13 +49,17 @@ def write_report(
     """
     folder = Path(folder)
     if not folder.is_dir():
-        raise StoreError("results folder", str(folder), "a folder that `evaluate`, `frontier` or `train` wrote")
-    wanted = "one that `evaluate`, `frontier` or `train` of this release wrote"
+        raise StoreError(
+            "results folder", str(folder), "a folder that `evaluate`, `frontier`, `multiverse` or `train` wrote"
+        )
+    wanted = "one that `evaluate`, `frontier`, `multiverse` or `train` of this release wrote"
     with wrap_read_errors("results folder", folder, wanted, StoreError):
         if (folder / RECORD).exists():
             text = _frontier(folder)
         elif (folder / training_page.RECORD).exists():
             text = _training(training_page.read_training(folder))
+        elif last_run(folder) is not None:
+            text = _multiverse(folder)
         else:
             run = Run.read(folder)
             text = _evaluation(run, SnapshotSet(run, pictures, videos, on_progress))
@@ -137,6 +142,24 @@ def _frontier(folder: Path) -> str:
         body.append(paragraph("Interrupted or still running: the report covers the finished levels."))
     body += frontier_page.parts(found)
     body.append(_anchored("Provenance", _origin(record)))
+    return page(f"artde-gym: {title}", body)
+
+
+def _multiverse(folder: Path) -> str:
+    found = read_multiverse(folder)
+    origin = {"provenance": found.provenance, "configuration": json.loads(found.design.text)}
+    title = f"Claims over plausible worlds of {found.design.env_id}"
+    body = [f"<h1>{escape(title)}</h1>"]
+    if found.episodes.empty:
+        return page(title, [*body, paragraph("No episode was finished yet."), _origin(origin)])
+    head, lines = multiverse_page.answer(found)
+    body.append(_answer(head, {"": lines}))
+    if not found.complete:
+        body.append(paragraph("Interrupted or still running: this holds the episodes that were finished."))
+    sections = list(multiverse_page.parts(found))
+    body.append(_contents([*(name for name, _ in sections), "Provenance"]))
+    body += [_anchored(name, *drawn) for name, drawn in sections]
+    body.append(_anchored("Provenance", _origin(origin)))
     return page(f"artde-gym: {title}", body)
 
 

@@ -1,12 +1,28 @@
 """Studies built on evaluations, each with a design, a store and a result of its own.
 
 `reproduce` judges the thesis' claims, `frontier` finds the largest disturbance that a controller survives, `tune` gives
-every controller the same number of trials, and `sweep` runs a grid or a random sample of cases.
+every controller the same number of trials, `sweep` runs a grid or a random sample of cases, and `multiverse` judges
+claims over plausible worlds.
 """
 
 from artde_gym.studies.frontier import Frontier, frontier
+from artde_gym.studies.multiverse import Multiverse, multiverse, read_multiverse, register_world_claims
 from artde_gym.studies.reproduce import Reproduction, reproduce
 from artde_gym.studies.sweep import Sweep, read_sweep, sweep
 from artde_gym.studies.tune import Tuning, tune
 
-__all__ = ["Frontier", "Reproduction", "Sweep", "Tuning", "frontier", "read_sweep", "reproduce", "sweep", "tune"]
+__all__ = [
+    "Frontier",
+    "Multiverse",
+    "Reproduction",
+    "Sweep",
+    "Tuning",
+    "frontier",
+    "multiverse",
+    "read_multiverse",
+    "read_sweep",
+    "register_world_claims",
+    "reproduce",
+    "sweep",
+    "tune",
+]

@@ -33,6 +33,14 @@ episodes: 1
 disturbances: {}
 env_kwargs: {duration: 0.1}
 """
+MULTIVERSE = """
+env: QuadInfinity-Payload-v0
+controllers: [pid]
+worlds: 1
+disturbances: {}
+env_kwargs: {duration: 0.1}
+factors: {wind: {path: disturbances.wind.scale, uniform: [0, 1], source: a guess}}
+"""
 FLYER = ["--env", "QuadInfinity-Payload-v0", "--controllers", "pid", "--env-kwargs", '{"duration": 0.1}']
 ONCE = ["--workers", "1", "--out", "out"]
 QUICK: dict[str, list[str]] = {
@@ -41,6 +49,7 @@ QUICK: dict[str, list[str]] = {
                  "--low", "0.1", "--high", "0.2", "--tolerance", "0.1"],
     "tune": [*FLYER, *ONCE, "--episodes", "1", "--trials", "2", "--held-out", "1", "--disturbances", "{}"],
     "sweep": ["sweep.yaml", *ONCE],
+    "multiverse": ["--design", "multiverse.yaml", *ONCE],
     "reproduce": ["--robot", "quadrotor", "--scenario", "Q1", "--controllers", "pid", "--episodes", "0", *ONCE],
     "train": ["--env", "BipedPush-v0", "--out", "out", "--algo", "none"],
     "report": ["empty"],
@@ -146,6 +155,7 @@ def test_whatever_an_option_is_given_there_is_an_answer(
         (folder / "empty").mkdir(parents=True)
         (folder / "file").write_text("not a folder")
         (folder / "sweep.yaml").write_text(SWEEP)
+        (folder / "multiverse.yaml").write_text(MULTIVERSE)
         monkeypatch.chdir(folder)
         import sys
         import time

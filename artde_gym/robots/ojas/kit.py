@@ -11,6 +11,7 @@ pattern of falls in MuJoCo; it is not confirmed in Bullet. 33 and 50 % bracket i
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 from artde_gym.kit import Environment, FrontierTest, Motion, Push, Range, RobotKit, random_push
@@ -137,4 +138,5 @@ KIT = RobotKit(
     push=Push("chest", 20.0),
     report="artde_gym.robots.ojas.report",
     scene="artde_gym.robots.ojas.scene:scene",
+    multiverse=Path(__file__).parent / "assets/multiverse.yaml",
 )

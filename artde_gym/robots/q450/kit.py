@@ -6,6 +6,7 @@ start (within 5 mm of the path), as hovering does.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from artde_gym.kit import Environment, FrontierTest, Motion, Push, Range, RobotKit, random_push
@@ -82,4 +83,5 @@ KIT = RobotKit(
     push=Push("body", 3.0),
     report="artde_gym.robots.q450.report",
     scene="artde_gym.robots.q450.scene:scene",
+    multiverse=Path(__file__).parent / "assets/multiverse.yaml",
 )

@@ -196,6 +196,10 @@ def _with_ablation(
 
 def equivalent_gains(result: Result, scenario: str) -> dict[str, float]:
     """Return the ablation's gains c (c_p, c_q for a cascade): means of ARTDE's over its episodes in a scenario."""
-    rows = result.rows(scenario, ADAPTIVE)
+    return mean_gains(result.rows(scenario, ADAPTIVE))
+
+
+def mean_gains(rows: pd.DataFrame) -> dict[str, float]:
+    """Return the ablation's gains from episodes of an adaptive law; none if the law has no adaptive gain."""
     means = {column.removeprefix(GAIN): rows[column].to_numpy(np.float64) for column in rows if column.startswith(GAIN)}
     return {f"c{suffix}": float(values.mean()) for suffix, values in means.items() if np.isfinite(values).all()}

@@ -13,10 +13,10 @@
         disturbances.payload.mass: {uniform: [0.5, 2.0]}
 
 A path is one of the fixed names, or one value inside: `gains.<controller>.<gain>`, `env_kwargs.<argument>`,
-`disturbances.<kind>` or `disturbances.<kind>.<parameter>`. Equal cells count once, however they are written (`1` and
-`1.0`, a payload of `1` and of `{mass: 1}`, an argument at its default): gains of a controller that a cell does not run
-change nothing in it. Draw i depends only on the seed, i and the path: more draws, or more paths, leave it unchanged,
-and every combination of the grid meets the same draws.
+`disturbances.<kind>`, `disturbances.<kind>.<parameter>`, or `disturbances.<kind>.<parameter>.<i>` of a vector. Equal
+cells count once, however they are written (`1` and `1.0`, a payload of `1` and of `{mass: 1}`, an argument at its
+default): gains of a controller that a cell does not run change nothing in it. Draw i depends only on the seed, i and the
+path: more draws, or more paths, leave it unchanged, and every combination of the grid meets the same draws.
 """
 
 from __future__ import annotations
@@ -37,9 +37,11 @@ import numpy as np
 from artde_gym.arguments import check_bool
 from artde_gym.deprecation import current_column, current_disturbances, warn
 from artde_gym.disturbances import DISTURBANCES
+from artde_gym.disturbances.kinds import parameters_of
 from artde_gym.errors import MissingDependencyError, OptionError, UnknownNameError, suggest_names
 from artde_gym.evaluation import canonical
 from artde_gym.evaluation.cells import Cell, cells_of
+from artde_gym.evaluation.environments import robot_of
 from artde_gym.evaluation.identity import identity_of
 from artde_gym.registration import ControllerSpec, registered_controllers
 from artde_gym.scenarios import scenario as find_scenario
@@ -140,7 +142,7 @@ def design(given: Mapping[str, Any]) -> Design:
         OptionError, UnknownNameError: for an unknown key, a wrong type, an unknown name, or too many cells or episodes.
             Environments and controllers are not asked here.
     """
-    _check_plain("sweep", given)
+    check_plain("sweep", given)
     given = _current(given)
     for key in given:
         if key not in KEYS:
@@ -151,7 +153,7 @@ def design(given: Mapping[str, Any]) -> Design:
     check_bool("vectorized", vectorized)
     fixed = {**SETTINGS, **{name: value for name, value in given.items() if name in SETTINGS}}
     for name, value in fixed.items():
-        _check_setting(name, value)
+        check_setting(name, value)
     grid = {_current_path(path): values for path, values in _grid(given.get("grid", {})).items()}
     draws = _draws(given.get("sample"), fixed["seed"])  # by the paths as written, so that old files draw the same
     draws = [{_current_path(path): value for path, value in draw.items()} for draw in draws]
@@ -170,7 +172,7 @@ def design(given: Mapping[str, Any]) -> Design:
     points: dict[str, SweepCell] = {}
     for values in itertools.product(*grid.values()):
         for draw in draws:
-            point = _point(_settings(fixed, {**dict(zip(grid, values, strict=True)), **draw}), vectorized, names)
+            point = point_of(settings_of(fixed, {**dict(zip(grid, values, strict=True)), **draw}), vectorized, names)
             points.setdefault(point.id, point)
     if len(points) * episodes > MOST_EPISODES:
         raise OptionError("sweep", f"{len(points) * episodes} episodes", f"at most {MOST_EPISODES}")
@@ -204,7 +206,7 @@ def _grid(given: Any) -> dict[str, list[Any]]:
     if not isinstance(given, Mapping):
         raise OptionError("grid", given, "a mapping of paths to lists of values")
     for path, values in given.items():
-        _check_path(path)
+        check_path(path)
         if not (isinstance(values, list) and values):
             raise OptionError(f"grid: {path}", values, "a list with at least one value")
     return dict(given)
@@ -220,12 +222,13 @@ def _draws(given: Any, seed: int) -> list[dict[str, Any]]:
     if not (_is_whole(draws) and 1 <= draws <= MOST_CELLS):
         raise OptionError("sample: draws", draws, f"a whole number from 1 to {MOST_CELLS}")
     for path, distribution in vary.items():
-        _check_path(path)
-        _check_distribution(f"sample: {path}", distribution)
+        check_path(path)
+        check_distribution(f"sample: {path}", distribution)
     return [{path: _draw(path, distribution, seed, i) for path, distribution in vary.items()} for i in range(draws)]
 
 
-def _check_distribution(field: str, given: Any) -> None:
+def check_distribution(field: str, given: Any) -> None:
+    """Refuse what is no distribution of `DISTRIBUTIONS`."""
     if not (isinstance(given, Mapping) and len(given) == 1 and next(iter(given)) in DISTRIBUTIONS):
         raise OptionError(field, given, f"a mapping of one of {', '.join(DISTRIBUTIONS)} to a list")
     ((kind, arguments),) = given.items()
@@ -234,7 +237,7 @@ def _check_distribution(field: str, given: Any) -> None:
         if not (isinstance(arguments, list) and arguments):
             raise OptionError(field, arguments, "a list with at least one value")
         return
-    good = _is_whole if kind == "integers" else _is_number
+    good = _is_whole if kind == "integers" else is_number
     if not (isinstance(arguments, list) and len(arguments) == 2 and all(map(good, arguments))):
         raise OptionError(field, arguments, f"two {'whole ' * (kind == 'integers')}numbers")
     first, second = arguments
@@ -263,7 +266,7 @@ def _draw(path: str, distribution: Mapping[str, list[Any]], seed: int, number: i
     return min(max(math.exp(rng.uniform(math.log(first), math.log(second))), first), second)
 
 
-def _settings(fixed: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+def settings_of(fixed: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
     """Return the settings of one cell: the fixed ones, overridden by whole settings, then by single values inside."""
     settings = dict(fixed)
     settings |= {path: value for path, value in values.items() if path in SETTINGS}
@@ -293,13 +296,35 @@ def _disturbed(settings: Mapping[str, Any], path: str, inside: str, value: Any) 
         raise UnknownNameError("disturbance", kind, suggest_names(kind, DISTURBANCES))
     if not parameter:
         return {**given, kind: value}
+    parameter, _, component = parameter.partition(".")
     names = [known.name for known in DISTURBANCES[kind].parameters]
     if parameter not in names:
         raise UnknownNameError(f"parameter of {kind}", parameter, suggest_names(parameter, names))
+    if component:
+        value = _with_component(_vector(settings, given, kind, parameter), path, component, value)
     return placed(given, kind, parameter, value)
 
 
-def _point(settings: Mapping[str, Any], vectorized: bool, names: set[Any]) -> SweepCell:
+def _vector(settings: Mapping[str, Any], given: Mapping[str, Any], kind: str, name: str) -> Any:
+    """Find what a parameter is before one of its components is set."""
+    env_id = settings["env"] or find_scenario(settings["scenario"]).env_id
+    known = DISTURBANCES[kind]
+    (parameter,) = (one for one in known.parameters if one.name == name)
+    default = known.default_of(parameter, robot_of(env_id))
+    return default if known.multiple else parameters_of(kind, given.get(kind)).get(name, default)
+
+
+def _with_component(vector: Any, path: str, component: str, value: Any) -> list[Any]:
+    places = [str(i) for i in range(len(vector))] if isinstance(vector, (list, tuple)) else []
+    if component not in places:
+        raise UnknownNameError(
+            f"component in {path}", component, suggest_names(component, places) or "none: it is one value"
+        )
+    return [value if place == component else one for place, one in zip(places, vector, strict=True)]
+
+
+def point_of(settings: Mapping[str, Any], vectorized: bool, names: set[Any]) -> SweepCell:
+    """Make the cell of some settings; `names` are the controllers of the whole study, whose gains may be given."""
     known, controller = registered_controllers(), settings["controller"]
     if controller not in known:
         raise UnknownNameError("controller", controller, suggest_names(controller, known))
@@ -322,7 +347,8 @@ def _point(settings: Mapping[str, Any], vectorized: bool, names: set[Any]) -> Sw
     return SweepCell(cell, controller, spec, gains, seed, digest[:16])
 
 
-def _check_path(path: str) -> None:
+def check_path(path: str) -> None:
+    """Refuse what is no path to a setting."""
     head, _, rest = path.partition(".")
     depth = {"gains": 2, "env_kwargs": 1, "disturbances": 1}.get(head, 0)
     if path not in SETTINGS and not (depth and rest.count(".") >= depth - 1 and all(path.split("."))):
@@ -332,10 +358,11 @@ def _check_path(path: str) -> None:
 def _check_at(path: str, value: Any) -> None:
     """Check the value for a path; values inside a setting are checked by their owners."""
     if path in SETTINGS:
-        _check_setting(path, value)
+        check_setting(path, value)
 
 
-def _check_setting(name: str, value: Any) -> None:
+def check_setting(name: str, value: Any) -> None:
+    """Refuse a whole setting of the wrong type."""
     if name in ("env", "scenario", "controller"):
         good, allowed = value is None or isinstance(value, str), "a name"
     elif name == "seed":
@@ -350,7 +377,7 @@ def _check_setting(name: str, value: Any) -> None:
         raise OptionError(name, value, allowed)
 
 
-def _check_plain(field: str, value: Any, depth: int = 0) -> None:
+def check_plain(field: str, value: Any, depth: int = 0) -> None:
     """Check that JSON can store a value, so that nothing else ever gets into an environment or a file."""
     if depth > DEEPEST:
         raise OptionError(field, "...", f"at most {DEEPEST} levels")
@@ -358,15 +385,16 @@ def _check_plain(field: str, value: Any, depth: int = 0) -> None:
         for key, item in value.items():
             if not isinstance(key, str):
                 raise OptionError(f"key of {field}", key, "text")
-            _check_plain(f"{field}: {key}", item, depth + 1)
+            check_plain(f"{field}: {key}", item, depth + 1)
     elif isinstance(value, list):
         for i, item in enumerate(value):
-            _check_plain(f"{field}[{i}]", item, depth + 1)
-    elif not (value is None or isinstance(value, (str, bool)) or _is_number(value)):
+            check_plain(f"{field}[{i}]", item, depth + 1)
+    elif not (value is None or isinstance(value, (str, bool)) or is_number(value)):
         raise OptionError(field, value, "finite numbers, text, true, false, null, lists and mappings")
 
 
-def _is_number(value: Any) -> bool:
+def is_number(value: Any) -> bool:
+    """Return whether a value is a finite number."""
     return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
 
 

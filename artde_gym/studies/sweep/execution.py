@@ -91,9 +91,9 @@ def sweep(
     points = {f"{point.cell.name} [{i}]": point for i, point in enumerate(plan.points)}
     complete = True
     with SweepStore(Path(out)) as store:
-        _refuse_others(plan, store)
+        refuse_others(plan, store)
         _check(plan, points, store.done, on_progress)
-        store.begin(plan.text, types, _behind(plan), allow_mixed=allow_mixed)
+        store.begin(plan.text, types, evidence_of(plan), allow_mixed=allow_mixed)
         total = len(points) * plan.episodes
         progress = Progress(len(store.done), total, on_progress and functools.partial(on_progress, "episodes"))
 
@@ -156,7 +156,7 @@ def _run(task: Task, on_time: Callable[[float], None]) -> list[Episode]:
         raise type(error)(f"{error.field} ({cell})", error.value, error.allowed) from error
 
 
-def _refuse_others(plan: Design, store: SweepStore) -> None:
+def refuse_others(plan: Design, store: SweepStore) -> None:
     """Reject a folder with episodes that are not of this sweep, so that its readers need not separate them."""
     cells = {point.id for point in plan.points}
     others = sum(cell not in cells or episode >= plan.episodes for cell, episode in store.done)
@@ -183,7 +183,7 @@ def _check(plan: Design, points: Mapping[str, SweepCell], done: set[Key], on_pro
             on_progress("cells checked", Update(task, 0.0, True, i, len(fresh)))
 
 
-def _behind(plan: Design) -> dict[str, str]:
+def evidence_of(plan: Design) -> dict[str, str]:
     """Return hashes of the controllers' weights and code, each built once per environment."""
     found: dict[str, str] = {}
     for point in {(point.controller, point.cell.env_id): point for point in reversed(plan.points)}.values():

@@ -1,0 +1,48 @@
+"""`artde-gym multiverse`: claims over plausible worlds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from artde_gym.cli.arguments import AllowMixed, Engine, Report, Workers, processes
+from artde_gym.cli.display import Display, terminal
+from artde_gym.cli.report import show_report
+from artde_gym.studies import multiverse as run_multiverse
+from artde_gym.studies.multiverse.console import print_multiverse
+
+
+def multiverse(
+    design: Annotated[str, typer.Option(help="A robot's standard design (ojas, q450), or a YAML file.")],
+    worlds: Annotated[int | None, typer.Option(help="Number of worlds. Default: the design's.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the worlds. Default: the design's.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Results folder. Default: runs/multiverse-<design>.")] = None,
+    workers: Workers = None,
+    vectorized: Annotated[
+        bool | None, typer.Option(help="Worlds side by side, or one by one. Default: the design's.")
+    ] = None,
+    engine: Engine = None,
+    allow_mixed: AllowMixed = False,
+    report: Report = False,
+) -> None:
+    """Judge claims over plausible worlds that all controllers meet; the same command continues."""
+    console = terminal()
+    with Display(console) as display:
+        found = run_multiverse(
+            design,
+            out or Path("runs") / f"multiverse-{Path(design).stem}",
+            worlds=worlds,
+            seed=seed,
+            vectorized=vectorized,
+            engine=engine,
+            workers=processes(workers),
+            allow_mixed=allow_mixed,
+            on_progress=lambda what, update: display(update, what),
+        )
+    print_multiverse(found, console)
+    if report:
+        show_report(found.folder, console)
+    if not found.complete:
+        raise typer.Exit(130)
