@@ -196,7 +196,7 @@ def preset_designs(loop: Loop, drive: Drive, *, tuned: bool) -> list[Design]:
 
 
 def _number(value: float) -> float | None:
-    """The value as JSON can write it."""
+    """Return the value as JSON can write it."""
     return float(value) if np.isfinite(value) else None
 
 

@@ -127,7 +127,7 @@ def vector(env_id: str, arguments: str, size: int) -> Any:
 
 @functools.lru_cache(maxsize=KEPT)
 def vector_of_one(env_id: str, arguments: str, size: int = 1) -> Any:
-    """A vector of one environment, to try arguments and disturbances on; a few are kept."""
+    """Build a vector of one environment, to try arguments and disturbances on; a few are kept."""
     return vector(env_id, arguments, size)
 
 

@@ -25,7 +25,7 @@ class Cell(NamedTuple):
 
 
 def page(title: str, body: Iterable[str]) -> str:
-    """The whole file; with the viewer of replays, if it has any."""
+    """Return the whole file, with the viewer of replays if it has any."""
     text = "\n".join(body)
     replayed = REPLAY in text
     look = (replays.style() if replayed else "") + _asset("chart.css") + _asset("style.css")

@@ -33,7 +33,7 @@ _LAST = ("Reference and loop", "Provenance")
 def write_report(
     folder: str | Path, *, pictures: bool = False, videos: bool = False, on_progress: Progress = lambda _: None
 ) -> Path:
-    """Write the report of an evaluation, a frontier, a multiverse or a training into its folder, finished or interrupted.
+    """Write the report of an evaluation, a study or a training into its folder, finished or interrupted.
 
     Args:
         folder: results folder of `evaluate`, `reproduce`, `frontier`, `multiverse` or `train`.

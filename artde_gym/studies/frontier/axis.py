@@ -93,7 +93,7 @@ def axis(
     tolerance: float | None = None,
     harder: Harder | None = None,
 ) -> Axis:
-    """The axis at `path`: "kind.parameter" of `artde_gym.disturbances.DISTURBANCES`, "gains.name", or an argument.
+    """Return the axis at `path`: a parameter of `artde_gym.disturbances.DISTURBANCES`, "gains.name", or an argument.
 
     Raises:
         UnknownNameError: if there is no number at this path.

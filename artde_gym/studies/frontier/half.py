@@ -89,7 +89,7 @@ def half_text(row: dict[Any, Any], varied: Axis) -> str:
 
 
 def _brackets(table: Array, grid: Sequence[float]) -> Array:
-    """The ends (resamples, 2) between which bootstrap samples of the seeds cross one half, the smaller first."""
+    """Return the ends (resamples, 2) between which bootstrap samples of the seeds cross one half, the smaller first."""
     seeds = len(table)
     draws = np.random.default_rng(0).integers(seeds, size=(RESAMPLES, seeds))
     counts = np.stack([np.bincount(draw, minlength=seeds) for draw in draws])
@@ -109,7 +109,7 @@ def _interval(lows: Array, highs: Array) -> tuple[float, float]:
 
 
 def _crossing(rates: Array, grid: Sequence[float]) -> tuple[float, float, float]:
-    """The value at which the falling curve through some rates crosses one half, and the levels on either side."""
+    """Return where the falling curve through some rates crosses one half, and the levels on either side."""
     harder = math.inf if grid[-1] > grid[0] else -math.inf
     curve = np.round(isotonic_regression(rates, increasing=False).x, 12)
     if curve[-1] > HALF:

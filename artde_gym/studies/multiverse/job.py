@@ -26,11 +26,10 @@ Numbered = tuple[int, SweepCell]
 
 
 class Job(NamedTuple):
-    """Episodes that run at once; `task` is what they share, `options` those of the reset with what they do not."""
+    """Episodes that run at once."""
 
     task: Task
     points: tuple[SweepCell, ...]
-    options: dict[str, Any] | None
 
 
 def jobs_of(points: Iterable[Numbered], vectorized: bool) -> Iterator[Job]:
@@ -38,7 +37,7 @@ def jobs_of(points: Iterable[Numbered], vectorized: bool) -> Iterator[Job]:
     groups: dict[str, list[Numbered]] = {}
     for number, point in points:
         alone = [number, point.controller]
-        place = [point.cell.env_id, _shared(point).kwargs] if vectorized else alone
+        place = [point.cell.env_id, _shared(point.cell)] if vectorized else alone
         groups.setdefault(json.dumps(place), []).append((number, point))
     for group in groups.values():
         for first in range(0, len(group), MOST):
@@ -54,12 +53,14 @@ def check_points(points: Sequence[Numbered], vectorized: bool, on_checked: Calla
     env: Any = None
     last, count = "", 0
     for job in jobs_of(points, vectorized):
-        place = json.dumps([job.task.cell.kwargs, job.options])
+        place = json.dumps([cell.kwargs for cell in job.task.cells])
         if place != last:
             last = place
-            env = _vector(job) if vectorized else validate_cell(vectorized, job.task.cell)
             if vectorized:
-                env.reset(seed=0, options=job.options)
+                env, options = vector_of(job.task.cells)
+                env.reset(seed=0, options=options)
+            else:
+                env = validate_cell(vectorized, job.task.cell)
         for point in job.points:
             policy_for(point.spec, env, point.gains)
         count += len(job.points)
@@ -78,39 +79,32 @@ def run(job: Job, on_time: Callable[[float], None]) -> list[Episode]:
 def _run_batch(job: Job, on_time: Callable[[float], None]) -> list[Episode]:
     task = job.task
     require_metrics(task.metrics)
-    env = _vector(job)
+    env, options = vector_of(task.cells)
     made: dict[str, Policy] = {}
     for point in job.points:  # equal policies are computed at once
         if (key := _key(point)) not in made:
             made[key] = policy_for(point.spec, env, point.gains)
     policy = SideBySide([made[_key(point)] for point in job.points], [point.spec.name for point in job.points])
-    return run_vector(env, policy, task.seeds, options=job.options, phases=task.cell.phases, on_progress=on_time)
+    return run_vector(env, policy, task.seeds, options=options, phases=task.cell.phases, on_progress=on_time)
 
 
 def _key(point: SweepCell) -> str:
     return json.dumps([point.spec.name, point.gains])
 
 
-def _vector(job: Job) -> Any:
-    return vector_of(job.task.cell, len(job.points))
-
-
 def _job(group: Sequence[Numbered], vectorized: bool) -> Job:
     numbers, points = zip(*group, strict=True)
     first = points[0]
     spec: ControllerSpec = first.spec
-    cell = _shared(first) if vectorized else first.cell
     seeds = [episode_seed(point.seed, 0) for point in points]
     names = ", ".join(dict.fromkeys(point.controller for point in points))
+    cells = tuple(point.cell for point in points)
     task = Task(
-        vectorized, cell, names, spec, first.gains, list(numbers), seeds, 100.0, 0, tuple(METRICS)
+        vectorized, first.cell, names, spec, first.gains, list(numbers), seeds, 100.0, 0, cells, tuple(METRICS)
     )  # fmt: skip
-    own = [point.cell.kwargs["disturbances"] for point in points if "disturbances" in point.cell.kwargs]
-    return Job(task, tuple(points), {"disturbances": own} if own else None)
+    return Job(task, tuple(points))
 
 
-def _shared(point: SweepCell) -> Cell:
-    """Return the cell without disturbances, in which worlds of a batch may differ; those of its own it keeps."""
-    if "disturbances" not in point.cell.kwargs:
-        return point.cell
-    return point.cell._replace(kwargs={**point.cell.kwargs, "disturbances": {}})
+def _shared(cell: Cell) -> dict[str, Any]:
+    """Return the arguments without disturbances, in which worlds of a batch may differ; those of its own it keeps."""
+    return {**cell.kwargs, "disturbances": {}} if "disturbances" in cell.kwargs else cell.kwargs

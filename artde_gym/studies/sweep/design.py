@@ -15,8 +15,8 @@
 A path is one of the fixed names, or one value inside: `gains.<controller>.<gain>`, `env_kwargs.<argument>`,
 `disturbances.<kind>`, `disturbances.<kind>.<parameter>`, or `disturbances.<kind>.<parameter>.<i>` of a vector. Equal
 cells count once, however they are written (`1` and `1.0`, a payload of `1` and of `{mass: 1}`, an argument at its
-default): gains of a controller that a cell does not run change nothing in it. Draw i depends only on the seed, i and the
-path: more draws, or more paths, leave it unchanged, and every combination of the grid meets the same draws.
+default): gains of a controller that a cell does not run change nothing in it. Draw i depends only on the seed, i and
+the path: more draws, or more paths, leave it unchanged, and every combination of the grid meets the same draws.
 """
 
 from __future__ import annotations
