@@ -67,8 +67,14 @@ def optional_json(option: str, text: str | None) -> dict[str, Any] | None:
 
 
 def environment_kwargs(text: str | None, engine: str | None) -> dict[str, Any]:
-    """Arguments of the environment out of `--env-kwargs` and `--engine`."""
+    """Read the arguments of the environment out of `--env-kwargs` and `--engine`, before anything is opened or written.
+
+    Raises:
+        OptionError: for text that is no JSON object, or an engine that is missing here (MissingDependencyError).
+    """
     kwargs = json_object("--env-kwargs", text)
+    if engine in ENGINES:
+        ENGINES[engine].require()
     return kwargs if engine is None else {**kwargs, "engine": engine}
 
 

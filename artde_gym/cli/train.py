@@ -12,7 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from artde_gym.cli.arguments import Engine, EnvKwargs, Report, Seed, environment_kwargs, json_object, processes
 from artde_gym.cli.display import terminal, words
 from artde_gym.cli.report import show_report
-from artde_gym.errors import OptionError
+from artde_gym.errors import MissingDependencyError
 
 
 def train(
@@ -81,5 +81,5 @@ def _trainer(algo: str) -> Callable[..., Path]:
     except ModuleNotFoundError as error:
         if error.name not in ("cmaes", "stable_baselines3", "torch", "tensorboard"):
             raise
-        raise OptionError("algo", algo, "what is installed; pip install 'artde-gym[rl]'") from error
+        raise MissingDependencyError("algo", algo, f"it needs {error.name}; pip install 'artde-gym[rl]'") from error
     return go

@@ -35,7 +35,7 @@ from typing import Any, get_args
 import numpy as np
 
 from artde_gym.disturbances import KINDS
-from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.errors import MissingDependencyError, OptionError, UnknownNameError, among
 from artde_gym.evaluation import canonical
 from artde_gym.evaluation.cells import Cell, cells_of
 from artde_gym.evaluation.environments import Backend
@@ -115,7 +115,7 @@ def read(path: str | Path) -> dict[str, Any]:
 
         from artde_gym.studies.sweep.yaml12 import Loader
     except ImportError as error:
-        raise OptionError("pyyaml", "not installed", "pip install 'artde-gym[sweep]'") from error
+        raise MissingDependencyError("package", "pyyaml", "pip install 'artde-gym[sweep]'") from error
 
     try:
         with Path(path).open("rb") as file:

@@ -13,7 +13,7 @@ import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from artde_gym.errors import OptionError, StoreError
+from artde_gym.errors import MissingDependencyError, StoreError
 
 SCHEMA = 2
 LABELS = {"cell": "text", "controller": "text", "env": "text", "scenario": "text", "seed": "seed", "episode": "whole"}
@@ -29,13 +29,13 @@ def pyarrow() -> Any:
     """The module.
 
     Raises:
-        OptionError: if it is not installed.
+        MissingDependencyError: if it is not installed.
     """
     try:
         import pyarrow
         import pyarrow.parquet
     except ImportError as error:
-        raise OptionError("pyarrow", "not installed", "pip install 'artde-gym[sweep]'") from error
+        raise MissingDependencyError("package", "pyarrow", "pip install 'artde-gym[sweep]'") from error
     return pyarrow
 
 

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from artde_gym.errors import OptionError, WorkerError
+from artde_gym.errors import MissingDependencyError, OptionError, WorkerError
 from artde_gym.evaluation.provenance import software
 from artde_gym.evaluation.workers import AHEAD, PATIENCE, Job, Runs, Work
 
@@ -68,7 +68,7 @@ def _ray() -> Any:
     try:
         import ray
     except ImportError as error:
-        raise OptionError("ray", "not installed", "pip install 'artde-gym[scale]'") from error
+        raise MissingDependencyError("package", "ray", "pip install 'artde-gym[scale]'") from error
     return ray
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from artde_gym.errors import OptionError
+from artde_gym.errors import MissingDependencyError
 from artde_gym.registration import GainRange
 
 Gains = dict[str, float]
@@ -18,14 +18,14 @@ class Proposer:
     """Optuna as a function from finished trials to the next gains.
 
     Raises:
-        OptionError: if it is not installed.
+        MissingDependencyError: if it is not installed.
     """
 
     def __init__(self, seed: int) -> None:
         try:
             import optuna
         except ImportError as error:
-            raise OptionError("optuna", "not installed", "pip install 'artde-gym[tune]'") from error
+            raise MissingDependencyError("package", "optuna", "pip install 'artde-gym[tune]'") from error
         self._optuna = optuna
         self._seed = seed
         optuna.logging.set_verbosity(optuna.logging.WARNING)  # not one line a trial
