@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import functools
 import json
 import shutil
 import subprocess
@@ -14,6 +15,7 @@ from types import TracebackType
 from typing import Any
 
 import pytest
+import typer.main
 import websocket
 from hypothesis import settings
 
@@ -29,6 +31,14 @@ QUIET = [
     "--disable-background-networking", "--disable-sync", "--disable-dev-shm-usage", "--hide-scrollbars",
     "--remote-debugging-port=0", "--remote-allow-origins=*",
 ]  # fmt: skip
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_command_line():
+    """Built once: Typer's runner builds it anew for each call, which takes longer than most calls do."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("typer.testing._get_command", functools.cache(typer.main.get_command))
+        yield
 
 
 def program() -> str | None:

@@ -115,11 +115,13 @@ def test_code_runs(name, tmp_path):
     run(SCRIPTS[name], tmp_path)
 
 
+WHOLE = typer.main.get_group(app)
+
+
 def parse(words: list[str]) -> None:
     """By the real command line, up to where it would begin to work."""
-    whole = typer.main.get_group(app)
-    context = whole.make_context("artde-gym", list(words), resilient_parsing=True)
-    name, command, rest = whole.resolve_command(context, list(words))
+    context = WHOLE.make_context("artde-gym", list(words), resilient_parsing=True)
+    name, command, rest = WHOLE.resolve_command(context, list(words))
     assert command is not None
     command.make_context(name, rest)
 
