@@ -137,6 +137,7 @@ def test_mentioned_command_parses_as_far_as_it_goes(words):
         parse(words)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("page", NOTEBOOKS)
 def test_notebook_executes(page, tmp_path):
     made = nbformat.reads(notebook(DOCS / page), as_version=4)
@@ -177,6 +178,7 @@ def site(tmp_path_factory):
     return folder
 
 
+@pytest.mark.once
 def test_every_link_of_the_site_leads_somewhere(site):
     pages = {path: Links(path.read_text(encoding="utf-8")) for path in site.rglob("*.html")}
     del pages[site / "404.html"]  # of a server, at its root

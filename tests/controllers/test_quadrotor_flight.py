@@ -17,6 +17,8 @@ from controllers.laws.cascade import CascadeGains, Flight, cascade, cascade_star
 from controllers.laws.tde import TdeGains
 from controllers.laws.tracking import Array, Law, Memory, Signals
 
+pytestmark = pytest.mark.once
+
 GRAVITY = np.array([0.0, 0.0, -9.81])
 PERIOD = 0.015
 INERTIA = np.array(q450.INERTIA)
