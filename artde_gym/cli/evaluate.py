@@ -19,6 +19,7 @@ from artde_gym.cli.arguments import (
     Pictures,
     Report,
     Seed,
+    Vectorized,
     Videos,
     Workers,
     environment_kwargs,
@@ -27,6 +28,8 @@ from artde_gym.cli.arguments import (
     names,
     optional_json,
     processes,
+    renamed_option,
+    vectorized_by,
 )
 from artde_gym.cli.display import Display, terminal
 from artde_gym.cli.report import show_report
@@ -48,25 +51,35 @@ def evaluate(
     seed: Seed = 0,
     workers: Workers = None,
     out: Out = None,
-    backend: Backend = "single",
+    vectorized: Vectorized = False,
+    backend: Backend = None,
     engine: Engine = None,
     disturbances: Disturbances = None,
     env_kwargs: EnvKwargs = None,
     gains: Gains = None,
-    traced: Annotated[
-        int | None, typer.Option(help="Episodes that leave signals. Default: all of them; none in the batch backend.")
+    record_episodes: Annotated[
+        int | None, typer.Option(help="Episodes that leave signals. Default: all of them; none if vectorized.")
     ] = None,
-    trace_hz: Annotated[float, typer.Option(help="Rate of stored signals; inf for all of them.")] = 100.0,
+    traced: Annotated[int | None, typer.Option(hidden=True)] = None,
+    record_hz: Annotated[float, typer.Option(help="Rate of stored signals; inf for all of them.")] = 100.0,
+    trace_hz: Annotated[float | None, typer.Option(hidden=True)] = None,
     allow_mixed: AllowMixed = False,
     report: Report = False,
     pictures: Pictures = False,
     videos: Videos = False,
 ) -> None:
     """Compare controllers on the same seeded episodes and print them beside the thesis."""
+    vectorized = vectorized_by(vectorized, backend)
+    if traced is not None:
+        renamed_option("--traced", "--record-episodes")
+        record_episodes = traced
+    if trace_hz is not None:
+        renamed_option("--trace-hz", "--record-hz")
+        record_hz = trace_hz
     if scenario is None:
         env = env or WALK
         scenario = ",".join(main_scenarios(env)) or None
-        if scenario is not None and backend == "batch":
+        if scenario is not None and vectorized:
             scenario = scenario.split(",")[0]
     kwargs = environment_kwargs(env_kwargs, engine)
     folder = folder_of(out)
@@ -83,9 +96,9 @@ def evaluate(
             disturbances=optional_json("--disturbances", disturbances),
             env_kwargs=kwargs,
             gains=json_object("--gains", gains),
-            backend=backend,  # pyright: ignore[reportArgumentType]  # checked there
-            traced=traced,
-            trace_hz=trace_hz,
+            vectorized=vectorized,
+            record_episodes=record_episodes,
+            record_hz=record_hz,
             allow_mixed=allow_mixed,
             on_progress=display,
         )

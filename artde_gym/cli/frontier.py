@@ -17,6 +17,7 @@ from artde_gym.cli.arguments import (
     Out,
     Report,
     Seed,
+    Vectorized,
     Workers,
     environment_kwargs,
     folder_of,
@@ -24,6 +25,7 @@ from artde_gym.cli.arguments import (
     names,
     optional_json,
     processes,
+    vectorized_by,
 )
 from artde_gym.cli.display import Display, terminal
 from artde_gym.cli.report import show_report
@@ -51,7 +53,8 @@ def frontier(
     disturbances: Disturbances = None,
     env_kwargs: EnvKwargs = None,
     gains: Gains = None,
-    backend: Backend = "single",
+    vectorized: Vectorized = False,
+    backend: Backend = None,
     allow_mixed: AllowMixed = False,
     report: Report = False,
 ) -> None:
@@ -75,7 +78,7 @@ def frontier(
             disturbances=optional_json("--disturbances", disturbances),
             env_kwargs=kwargs,
             gains=json_object("--gains", gains),
-            backend=backend,  # pyright: ignore[reportArgumentType]  # checked there
+            vectorized=vectorized_by(vectorized, backend),
             allow_mixed=allow_mixed,
             on_progress=lambda value, update: display(update, f"{vary} {value:g}"),
         )

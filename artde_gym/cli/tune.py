@@ -16,12 +16,14 @@ from artde_gym.cli.arguments import (
     EnvKwargs,
     Out,
     Seed,
+    Vectorized,
     Workers,
     environment_kwargs,
     folder_of,
     names,
     optional_json,
     processes,
+    vectorized_by,
 )
 from artde_gym.cli.display import Display, terminal
 from artde_gym.studies import tune as run_tuning
@@ -40,7 +42,8 @@ def tune(
     seed: Seed = 0,
     workers: Workers = None,
     out: Out = None,
-    backend: Backend = "single",
+    vectorized: Vectorized = False,
+    backend: Backend = None,
     engine: Engine = None,
     disturbances: Disturbances = None,
     env_kwargs: EnvKwargs = None,
@@ -62,7 +65,7 @@ def tune(
             out=folder_of(out),
             disturbances=optional_json("--disturbances", disturbances),
             env_kwargs=kwargs,
-            backend=backend,  # pyright: ignore[reportArgumentType]  # checked there
+            vectorized=vectorized_by(vectorized, backend),
             allow_mixed=allow_mixed,
             on_progress=lambda what, update: display(update, what),
         )

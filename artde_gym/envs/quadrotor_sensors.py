@@ -32,13 +32,13 @@ class Sensors:
         self._n, self._dtype = n, dtype
         self._keys = np.zeros((2, n), np.uint64)
 
-    def begin(self, vehicle: int, realised: Mapping[str, Any], keys: NDArray[np.uint64]) -> None:
-        """Begin an episode of one vehicle, with realised disturbances and two keys of its noise."""
+    def begin(self, vehicle: int, sampled: Mapping[str, Any], keys: NDArray[np.uint64]) -> None:
+        """Begin an episode of one vehicle, with sampled disturbances and two keys of its noise."""
         self._keys[:, vehicle] = keys
-        if self._noise is None and "sensor_noise" in realised:
+        if self._noise is None and "sensor_noise" in sampled:
             self._noise = VehicleNoise(self._n, self._dtype)
         if self._noise is not None:
-            self._noise.begin(vehicle, realised)
+            self._noise.begin(vehicle, sampled)
 
     @property
     def ideal(self) -> bool:

@@ -9,9 +9,10 @@ from typing import Any
 
 import pandas as pd
 
+from artde_gym.deprecation import current_configuration
 from artde_gym.errors import StoreError
 from artde_gym.evaluation.store import parse_table
-from artde_gym.palette import looks
+from artde_gym.palette import styles
 from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.html import Cell, figure, table
 from artde_gym.studies.frontier.axis import Axis as Varied
@@ -28,7 +29,7 @@ def read_frontier(folder: Path) -> tuple[Frontier, dict[str, Any]]:
     """
     try:
         record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
-        wanted = record["configuration"]
+        wanted = record["configuration"] = current_configuration(record["configuration"])
         texts = [(folder / name).read_text(encoding="utf-8") for name in ("frontier.csv", "levels.csv")]
         table, levels = (parse_table(text, ("controller", "relation")) for text in texts)
         varied, survival = Varied(**wanted["axis"]), wanted["survival"]
@@ -56,7 +57,7 @@ def answer(found: Frontier) -> tuple[str, list[str]]:
 def parts(found: Frontier) -> list[str]:
     """Chart and tables."""
     axis = found.axis
-    shown = looks(str(row["controller"]) for row in _records(found.table))
+    shown = styles(str(row["controller"]) for row in _records(found.table))
     x = Axis.of(f"{axis.path} ({axis.unit})" if axis.unit != "1" else axis.path, [axis.low, axis.high])
     chart = Chart("Share of episodes without a fall against what was varied", x, Axis("no fall (%)", 0, 104), 460, 280)
     chart.level(100 * found.survival, f"wanted: {100 * found.survival:g} %")

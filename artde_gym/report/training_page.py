@@ -9,9 +9,10 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
+from artde_gym.deprecation import current_configuration
 from artde_gym.errors import StoreError
 from artde_gym.evaluation.store import parse_table
-from artde_gym.palette import looks
+from artde_gym.palette import styles
 from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.html import Cell, figure, paragraph, table
 
@@ -51,9 +52,9 @@ def read_training(folder: Path) -> Trained:
     """
     try:
         record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
-        wanted = record["configuration"]
+        wanted = record["configuration"] = current_configuration(record["configuration"])
         tests = parse_table((folder / CURVE).read_text(encoding="utf-8"), ())
-        name = f"{wanted['recipe']['base']}+{wanted['algo']}"
+        name = f"{wanted['config']['base']}+{wanted['algo']}"
         tests = tests.astype(float)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise StoreError(
@@ -91,7 +92,7 @@ def answer(run: Trained) -> tuple[str, list[str]]:
 
 def parts(run: Trained) -> list[str]:
     """Charts of every number that the tests have, and all of them as a table."""
-    tests, shown = run.tests, looks([run.name])
+    tests, shown = run.tests, styles([run.name])
     look = shown[run.name]
     steps = tests["steps"].to_numpy(dtype=float) / MILLION
     across = Axis("decisions (millions)", 0.0, float(steps.max()) * 1.02)
@@ -112,7 +113,8 @@ def parts(run: Trained) -> list[str]:
         for row in tests.itertuples(index=False, name=None)
     ]
     wanted = run.record["configuration"]
-    said = f"{run.name} in {wanted['env_id']}: {wanted['recipe']['channel']} channel, seed {wanted['seed']}, at most "
+    mode = wanted["config"]["action_mode"]
+    said = f"{run.name} in {wanted['env_id']}: action mode {mode}, seed {wanted['seed']}, at most "
     return [
         paragraph(f"{said}{_millions(wanted['steps'])} decisions."),
         figure("Held-out tests during the training; the vertical mark is the policy that was kept.", charts, shown),

@@ -17,7 +17,7 @@ _INFINITY = "QuadInfinity-Payload-v0"
 _LOAD: dict[str, Any] = {
     "mass": {"uniform": [0.95 * 0.35, 1.05 * 0.35]},
     "position": [{"uniform": [0.005, 0.015]}, {"uniform": [-0.005, 0.005]}, {"uniform": [-0.105, -0.095]}],
-    "drop": 35.0,
+    "detach_time": 35.0,
 }
 _FLIGHT: dict[str, Any] = {
     "payload": _LOAD,
@@ -38,17 +38,17 @@ _FRONTIER = FrontierTest(
     when=_LOOP,
     repeated={
         "push": [random_push("body", _LOOP)],
-        "actuator_loss": [{"joint": "front_left", "start": {"uniform": list(_LOOP)}}],
+        "actuator_effectiveness": [{"joint": "front_left", "start": {"uniform": list(_LOOP)}}],
     },
     time_step=0.005,
     ranges={
         "wind.scale": Range(0.0, 10.0, 0.25),
         "payload.mass": Range(0.1, 2.0, 0.05),
         "push.magnitude": Range(0.0, 60.0, 2.0),
-        "torque_delay.samples": Range(0.0, 10.0, 1.0),
+        "action_delay.steps": Range(0.0, 10.0, 1.0),
         "motor_lag.time_constant": Range(0.0, 0.2, 0.005),
-        "actuator_loss.factor": Range(0.0, 1.0, 0.05, "smaller"),
-        "mass_error.factor": Range(0.5, 2.0, 0.05),
+        "actuator_effectiveness.factor": Range(0.0, 1.0, 0.05, "smaller"),
+        "mass_scale.factor": Range(0.5, 2.0, 0.05),
         "ground_effect.strength": Range(0.0, 10.0, 0.5),
         "sensor_noise.position": Range(0.0, 0.1, 0.0025),
         "sensor_noise.velocity": Range(0.0, 1.0, 0.025),
@@ -65,7 +65,7 @@ KIT = RobotKit(
         Environment(
             _INFINITY,
             "artde_gym.envs.quadrotor:QuadInfinityPayloadEnv",
-            "artde_gym.envs.quadrotor_batch:QuadInfinityPayloadVectorEnv",
+            "artde_gym.envs.quadrotor_vector:QuadInfinityPayloadVectorEnv",
             main=("Q1", "Q1-calm", "Q1-gale"),
         ),
     ),

@@ -7,13 +7,14 @@ from collections.abc import Callable, Mapping
 from typing import TypeAlias
 
 from artde_gym.arrays import Array
+from artde_gym.deprecation import renamed_arguments
 
 Fields: TypeAlias = Mapping[str, Array]
 """Observations by field name, each (..., size)."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Tracked:
+class TrackedSignal:
     """A vector that is meant to follow its reference.
 
     Attributes:
@@ -33,7 +34,7 @@ class Tracked:
 
 
 @dataclasses.dataclass(frozen=True)
-class Effort:
+class EffortSignal:
     """Forces or torques of one unit.
 
     Attributes:
@@ -51,35 +52,45 @@ class Effort:
     axes: Mapping[str, int]
 
 
+@renamed_arguments(
+    {
+        "band": "settling_band",
+        "limited": "saturated_field",
+        "means": "diagnostic_means",
+        "near": "saturation_margin",
+        "told": "recorded_info",
+    }
+)
 @dataclasses.dataclass(frozen=True)
-class Tracking:
+class MetricsSpec:
     """Everything that metrics have to know of an environment.
 
     Attributes:
         errors: the first one is what recovery, IAE and ITAE are measured by.
         norm: whether that one's components make one number by their Euclidean norm (of a vector in space) or by their
             root mean square (of joints).
-        band: size of error that counts as recovered, in SI.
+        settling_band: size of error that counts as recovered, in SI.
         efforts: what was applied.
         power: observations -> power spent (...), W.
-        limited: field whose values saturate at its bounds.
-        near: share of the field's range that counts as at the bound; a lag approaches it without reaching it.
+        saturated_field: field whose values saturate at its bounds.
+        saturation_margin: share of the field's range that counts as at the bound; a lag approaches it without
+            reaching it.
         tde_errors: column -> diagnostic of a policy that is an error of time-delay estimation.
-        means: column -> diagnostic of a policy, one number, whose mean is reported.
-        told: entries of `info` that belong into an episode's traces too.
+        diagnostic_means: column -> diagnostic of a policy, one number, whose mean is reported.
+        recorded_info: entries of `info` that belong into an episode's traces too.
         speed: observations -> speed of travel (...), m/s, where a cost of transport makes sense.
     """
 
-    errors: tuple[Tracked, ...]
+    errors: tuple[TrackedSignal, ...]
     norm: bool
-    band: float
-    efforts: tuple[Effort, ...]
+    settling_band: float
+    efforts: tuple[EffortSignal, ...]
     power: Callable[[Fields], Array]
-    limited: str
-    near: float
+    saturated_field: str
+    saturation_margin: float
     tde_errors: Mapping[str, str]
-    means: Mapping[str, str]
-    told: tuple[str, ...] = ()
+    diagnostic_means: Mapping[str, str]
+    recorded_info: tuple[str, ...] = ()
     speed: Callable[[Fields], Array] | None = None
 
     @property
