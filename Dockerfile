@@ -1,4 +1,5 @@
-# docker build -t artde-gym . && docker run --rm -v "$PWD/runs:/home/walker/runs" artde-gym
+# docker build -t artde-gym . && mkdir -p runs && docker run --rm -v "$PWD/runs:/home/walker/runs" artde-gym
+# The user is 1000; for a folder of another one: docker run --user "$(id -u)" --env HOME=/tmp ...
 FROM python:3.11-slim
 RUN useradd --create-home --uid 1000 walker
 COPY --chown=walker . /home/walker/artde-gym

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import functools
 import json
 import shutil
 import subprocess
@@ -14,6 +15,7 @@ from types import TracebackType
 from typing import Any
 
 import pytest
+import typer.main
 import websocket
 from hypothesis import settings
 
@@ -32,6 +34,14 @@ QUIET = [
 FLAT = ["--disable-gpu", "--disable-3d-apis"]  # as where there is no WebGL
 SOLID = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]  # WebGL without a graphics card
 SLOW = "GPU stall due to ReadPixels"  # of software's WebGL: no fault of the page
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_command_line():
+    """Built once: Typer's runner builds it anew for each call, which takes longer than most calls do."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("typer.testing._get_command", functools.cache(typer.main.get_command))
+        yield
 
 
 def program() -> str | None:

@@ -115,11 +115,13 @@ def test_code_runs(name, tmp_path):
     run(SCRIPTS[name], tmp_path)
 
 
+WHOLE = typer.main.get_group(app)
+
+
 def parse(words: list[str]) -> None:
     """By the real command line, up to where it would begin to work."""
-    whole = typer.main.get_group(app)
-    context = whole.make_context("artde-gym", list(words), resilient_parsing=True)
-    name, command, rest = whole.resolve_command(context, list(words))
+    context = WHOLE.make_context("artde-gym", list(words), resilient_parsing=True)
+    name, command, rest = WHOLE.resolve_command(context, list(words))
     assert command is not None
     command.make_context(name, rest)
 
@@ -135,6 +137,7 @@ def test_mentioned_command_parses_as_far_as_it_goes(words):
         parse(words)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("page", NOTEBOOKS)
 def test_notebook_executes(page, tmp_path):
     made = nbformat.reads(notebook(DOCS / page), as_version=4)
@@ -175,6 +178,7 @@ def site(tmp_path_factory):
     return folder
 
 
+@pytest.mark.once
 def test_every_link_of_the_site_leads_somewhere(site):
     pages = {path: Links(path.read_text(encoding="utf-8")) for path in site.rglob("*.html")}
     del pages[site / "404.html"]  # of a server, at its root

@@ -94,8 +94,14 @@ def optional_json(option: str, text: str | None) -> dict[str, Any] | None:
 
 
 def environment_kwargs(text: str | None, engine: str | None) -> dict[str, Any]:
-    """Return the environment's arguments from `--env-kwargs` and `--engine`."""
+    """Return the environment's arguments from `--env-kwargs` and `--engine`, before anything is opened or written.
+
+    Raises:
+        OptionError: if the text is not a JSON object, or the engine is not installed (MissingDependencyError).
+    """
     kwargs = json_object("--env-kwargs", text)
+    if engine in ENGINES:
+        ENGINES[engine].require()
     return kwargs if engine is None else {**kwargs, "engine": engine}
 
 

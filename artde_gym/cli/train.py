@@ -21,7 +21,7 @@ from artde_gym.cli.arguments import (
 )
 from artde_gym.cli.display import terminal, words
 from artde_gym.cli.report import show_report
-from artde_gym.errors import OptionError
+from artde_gym.errors import MissingDependencyError
 
 
 def train(
@@ -102,5 +102,5 @@ def _trainer(algo: str) -> Callable[..., Path]:
     except ModuleNotFoundError as error:
         if error.name not in ("cmaes", "stable_baselines3", "torch", "tensorboard"):
             raise
-        raise OptionError("algo", algo, "an installed algorithm: pip install 'artde-gym[rl]'") from error
+        raise MissingDependencyError("algo", algo, f"it needs {error.name}; pip install 'artde-gym[rl]'") from error
     return go

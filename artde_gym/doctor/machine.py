@@ -62,7 +62,7 @@ def extras() -> list[CheckResult]:
     for extra in metadata.metadata(PACKAGE).get_all("Provides-Extra") or ():
         remedy = f"pip install '{PACKAGE}[{extra}]'"
         found = [_installed(requirement, "missing", remedy) for requirement in _requirements(extra)]
-        text = ", ".join(f"{outcome.what} {outcome.found}" for outcome in found)
+        text = ", ".join(f"{outcome.what} {outcome.found}" for outcome in found) or "in the core"
         whole = all(outcome.status == "ok" for outcome in found)
         outcomes.append(CheckResult(f"extra [{extra}]", "ok" if whole else "missing", text, "" if whole else remedy))
     return outcomes

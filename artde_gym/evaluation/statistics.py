@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+import scipy  # its `stats`, half a second, is imported when it is first used: not by workers
 from numpy.typing import ArrayLike
-from scipy import stats
 
 from artde_gym.arrays import Array
 
@@ -49,7 +49,7 @@ def median(values: ArrayLike) -> Estimate:
     count = len(known)
     if not count:
         return Estimate(np.nan, np.nan, np.nan, 0)
-    rank = int(stats.binom.ppf((1 - CONFIDENCE) / 2, count, 0.5))
+    rank = int(scipy.stats.binom.ppf((1 - CONFIDENCE) / 2, count, 0.5))
     low, high = (known[rank - 1], known[count - rank]) if rank else (np.nan, np.nan)
     return Estimate(float(np.median(known)), float(low), float(high), count)
 
@@ -87,7 +87,7 @@ def _bootstrap(
         return Estimate(value, np.nan, np.nan, count)
     if all(np.ptp(sample) == 0 for sample in samples):
         return Estimate(value, value, value, count)
-    interval = stats.bootstrap(
+    interval = scipy.stats.bootstrap(
         samples,
         statistic,
         n_resamples=RESAMPLES,
@@ -101,7 +101,7 @@ def _bootstrap(
 
 def _central_limit(deviations: Array, value: float) -> Estimate:
     """Return an estimate whose error is the mean error of its values."""
-    half = stats.norm.ppf(0.5 + CONFIDENCE / 2) * float(deviations.std()) / np.sqrt(len(deviations))
+    half = scipy.stats.norm.ppf(0.5 + CONFIDENCE / 2) * float(deviations.std()) / np.sqrt(len(deviations))
     return Estimate(value, value - half, value + half, len(deviations))
 
 
@@ -109,7 +109,7 @@ def rate(successes: int, trials: int) -> Estimate:
     """Compute a rate with Wilson's score interval."""
     if trials == 0:
         return Estimate(np.nan, np.nan, np.nan, 0)
-    interval = stats.binomtest(successes, trials).proportion_ci(CONFIDENCE, method="wilson")
+    interval = scipy.stats.binomtest(successes, trials).proportion_ci(CONFIDENCE, method="wilson")
     return Estimate(successes / trials, float(interval.low), float(interval.high), trials)
 
 

@@ -55,14 +55,22 @@ class EngineSpec:
             return f"{self.title} cannot be imported ({error}): pip install '{self.package}'"
         return ""
 
+    def require(self) -> None:
+        """Check that it can be used here.
+
+        Raises:
+            MissingDependencyError: if it cannot.
+        """
+        if missing := self.missing():
+            raise MissingDependencyError("engine", self.name, missing)
+
     def load(self, entry_point: str) -> Any:
         """Import one of its classes.
 
         Raises:
             MissingDependencyError: if it is unavailable.
         """
-        if missing := self.missing():
-            raise MissingDependencyError("engine", self.name, missing)
+        self.require()
         return _imported(entry_point)
 
 

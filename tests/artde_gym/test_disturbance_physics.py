@@ -26,6 +26,8 @@ from artde_gym.sim.engine import Engine, State
 from artde_gym.sim.factory import EngineName, make_engine
 from artde_gym.sim.mujoco import MujocoEngine, mj
 
+pytestmark = pytest.mark.once
+
 G = 9.81
 WEIGHT = TOTAL_MASS * G
 DT = 0.001  # s, of the physics

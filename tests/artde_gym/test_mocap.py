@@ -14,6 +14,8 @@ import artde_gym  # noqa: F401  (registers the environments)
 from artde_gym.disturbances import mocap
 from artde_gym.disturbances.mocap import Mocap, tracking_gains
 
+pytestmark = pytest.mark.once
+
 ID = "QuadInfinity-Payload-v0"
 Pilot = Callable[[np.ndarray], np.ndarray]
 WINDY: dict[str, Any] = {"wind": 2.0}

@@ -19,6 +19,8 @@ from artde_gym.robots.ojas.model import ARMATURE, TOTAL_MASS, ojas
 from artde_gym.sim.engine import Engine
 from artde_gym.sim.factory import EngineName, make_engine
 
+pytestmark = pytest.mark.once
+
 ID = "BipedWalk-Payload-v0"
 DT = 0.001  # s, of the physics
 WORLD: dict[str, Any] = {

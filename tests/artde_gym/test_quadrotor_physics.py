@@ -16,6 +16,8 @@ from artde_gym.disturbances.ground_effect import thrust_gain
 from artde_gym.disturbances.schedule import EVENTS
 from artde_gym.robots.q450 import model as q450
 
+pytestmark = pytest.mark.once
+
 ID = "QuadInfinity-Payload-v0"
 G = 9.81
 WEIGHT = q450.MASS * G

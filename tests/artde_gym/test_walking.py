@@ -12,6 +12,8 @@ from artde_gym.multibody.dynamics import GRAVITY, RigidBodyTree
 from artde_gym.robots.ojas.model import ANKLE_HEIGHT, FOOT_CENTER_AHEAD, FOOT_SIZE, HIP_OFFSET, ojas
 from artde_gym.robots.ojas.walking import STAND, WalkingPattern, hip_height_above_ankle, walking_pattern
 
+pytestmark = pytest.mark.once
+
 PERIOD, DURATION, STEPS = 0.001, 58.0, 54
 SPEEDS = (0.1, 0.2)
 MIRROR = np.array([-1, -1, 1, 1, 1, -1])  # of q1..q6: yaw and roll change their sign

@@ -66,11 +66,12 @@ def generations(folder) -> list[dict[str, Any]]:
 
 
 @pytest.mark.torch
-def test_a_continued_tuning_equals_one_that_never_stopped(tuning, tmp_path):
-    tuning.tune(training(800), tmp_path / "whole")
+def test_a_continued_tuning_equals_one_that_never_stopped(tuning, tmp_path, monkeypatch):
+    monkeypatch.setattr(tuning, "DURATION", 0.5)
+    tuning.tune(training(400), tmp_path / "whole")
     tuning.tune(training(1), tmp_path / "parts")
     assert len(generations(tmp_path / "parts")) == 1
-    tuning.tune(training(800), tmp_path / "parts")
+    tuning.tune(training(400), tmp_path / "parts")
     assert generations(tmp_path / "parts") == generations(tmp_path / "whole")
     assert len(generations(tmp_path / "whole")) > 1
 

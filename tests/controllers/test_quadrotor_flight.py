@@ -17,6 +17,8 @@ from controllers.laws.cascade import CascadeGains, QuadrotorInput, cascade, casc
 from controllers.laws.tde import TdeGains
 from controllers.laws.tracking import Array, JointInput, Law, LawState
 
+pytestmark = pytest.mark.once
+
 GRAVITY = np.array([0.0, 0.0, -9.81])
 PERIOD = 0.015
 INERTIA = np.array(q450.INERTIA)

@@ -1,0 +1,77 @@
+"""Commands that need a package which is not here: one line that names it and what to install, and nothing written."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+import typer.main
+from typer.testing import CliRunner
+
+from artde_gym.cli import app
+from artde_gym.errors import MissingDependencyError, OptionError
+from artde_gym.sim import factory
+
+FLIGHT = ["--env", "QuadInfinity-Payload-v0"]
+SHORT = [*FLIGHT, "--controllers", "tde", "--out", "out", "--env-kwargs", '{"duration": 0.1}', "--disturbances", "{}"]
+NO_BULLET = "PyBullet has no wheel for CPython 3.13"
+IN_ENGINES = {
+    "evaluate": [*SHORT, "--episodes", "1"],
+    "frontier": [*SHORT, "--episodes", "1", "--vary", "payload.mass"],
+    "tune": [*SHORT, "--episodes", "1", "--trials", "1"],
+    "train": [*FLIGHT, "--algo", "ppo", "--out", "out", "--steps", "1"],
+    "video": [*FLIGHT, "--controllers", "tde", "--out", "out.gif"],
+    "play": FLIGHT,
+    "reproduce": ["--robot", "quadrotor", "--episodes", "1", "--out", "out"],
+}
+
+
+def refusal(words: list[str]) -> BaseException | None:
+    return CliRunner().invoke(app, words).exception
+
+
+@pytest.fixture(autouse=True)
+def in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def test_these_are_all_commands_that_know_engines() -> None:
+    commands = typer.main.get_group(app).commands
+    assert {name for name, one in commands.items() for option in one.params if option.name == "engine"} == {*IN_ENGINES}
+
+
+@pytest.mark.parametrize("command", IN_ENGINES)
+def test_each_command_refuses_an_engine_that_is_missing(
+    command: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(factory, "missing_bullet", lambda: NO_BULLET)
+    error = refusal([command, *IN_ENGINES[command], "--engine", "bullet"])
+    assert isinstance(error, MissingDependencyError)
+    assert str(error) == f"engine 'bullet' is not available: {NO_BULLET}"
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("package", "words", "extra"),
+    [
+        ("stable_baselines3", ["train", *IN_ENGINES["train"]], "rl"),
+        ("torch", ["train", *IN_ENGINES["train"]], "rl"),
+        ("cmaes", ["train", "--env", "BipedPush-v0", "--algo", "cma-es", "--out", "out"], "rl"),
+        ("optuna", ["tune", *IN_ENGINES["tune"]], "tune"),
+        ("yaml", ["sweep", "sweep.yaml", "--out", "out"], "sweep"),
+        ("pyarrow", ["sweep", "sweep.yaml", "--out", "out"], "sweep"),
+        ("imageio_ffmpeg", ["video", *FLIGHT, "--controllers", "tde", "--out", "out.mp4"], "video"),
+    ],
+)
+def test_each_command_says_which_extra_it_needs(
+    package: str, words: list[str], extra: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    for name in [name for name in sys.modules if name.startswith(("baselines.t", "artde_gym.studies.sweep.yaml12"))]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, package, None)
+    error = refusal(words)
+    assert isinstance(error, OptionError), repr(error)
+    assert f"pip install 'artde-gym[{extra}]'" in str(error)
+    assert "\n" not in str(error)
+    assert list(tmp_path.iterdir()) == []
