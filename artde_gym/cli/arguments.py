@@ -100,7 +100,7 @@ def environment_kwargs(text: str | None, engine: str | None) -> dict[str, Any]:
         OptionError: if the text is not a JSON object, or the engine is not installed (MissingDependencyError).
     """
     kwargs = json_object("--env-kwargs", text)
-    if engine in ENGINES:
+    if engine is not None and engine in ENGINES:
         ENGINES[engine].require()
     return kwargs if engine is None else {**kwargs, "engine": engine}
 

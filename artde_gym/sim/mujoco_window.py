@@ -49,7 +49,7 @@ class MujocoWindow:
 
     def __init__(self) -> None:
         errors: list[str] = []
-        glfw.set_error_callback(lambda _, text: errors.append(text.decode(errors="replace")))
+        glfw.set_error_callback(lambda _, text: errors.append(str(text, "utf-8") if isinstance(text, bytes) else text))
         self._window: Any = glfw.create_window(*SIZE, "artde-gym", None, None) if glfw.init() else None
         if self._window is None:
             why = errors[-1] if errors else "GLFW reports no reason"

@@ -117,7 +117,7 @@ class Recorder:
             step(tau)
             self.loads.append(loads())
 
-        monkeypatch.setattr(engine, "push", note_push)
+        monkeypatch.setattr(engine, "apply_force", note_push)
         monkeypatch.setattr(engine, "lift_feet", note_lift)
         monkeypatch.setattr(engine, "step", note_step)
 

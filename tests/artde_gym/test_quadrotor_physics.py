@@ -209,7 +209,7 @@ def test_without_the_payloads_moment_it_pitches_about_the_common_center(kind: st
 
 @EVERY_KIND
 def test_a_dropped_payload_sets_the_vehicle_free_without_a_jerk(kind: str) -> None:
-    flight = Flight(kind, loaded(position=[0.0, 0.0, -0.1], drop=0.1))
+    flight = Flight(kind, loaded(position=[0.0, 0.0, -0.1], detach_time=0.1))
     start = flight.reset()
     before = flight.fly(start["wrench_applied"], 0.1)
     assert not any(np.any(flight.info[name]) for name in EVENTS)
@@ -223,7 +223,7 @@ def test_a_dropped_payload_sets_the_vehicle_free_without_a_jerk(kind: str) -> No
 @EVERY_KIND
 def test_what_moves_goes_on_moving_when_the_payload_goes(kind: str) -> None:
     push = {"body": "front_left", "magnitude": 6.0, "direction": [1, 0.5, 1], "start": 0.1, "duration": 0.1}
-    flight = Flight(kind, {**loaded(drop=0.25), "push": [push]})
+    flight = Flight(kind, {**loaded(detach_time=0.25), "push": [push]})
     start = flight.reset()
     fields = flight.fly(start["wrench_applied"], 0.3)
     before, middle, after = 49, 50, 51  # the drop is at 0.25 s, row 49
@@ -241,7 +241,7 @@ def test_what_moves_goes_on_moving_when_the_payload_goes(kind: str) -> None:
 
 @EVERY_KIND
 def test_a_payload_may_come_later(kind: str) -> None:
-    flight = Flight(kind, loaded(position=[0.0, 0.0, -0.1], attach=0.1))
+    flight = Flight(kind, loaded(position=[0.0, 0.0, -0.1], attach_time=0.1))
     start = flight.reset()
     np.testing.assert_allclose(start["wrench_applied"], HOVER, atol=1e-12)
     fields = flight.fly(HOVER, 0.3)

@@ -86,7 +86,7 @@ from artde_gym.studies.reproduce.claims import CLAIMS
 import sys
 
 assert {"inference", "training", "more"} <= set(SECTIONS)
-assert {"validity", "broken", "mine"} <= set(CHECKS)
+assert {"stability", "broken", "mine"} <= set(CHECKS)
 assert [*ENGINES] == ["bullet", "mujoco", "mine"]
 assert [*CLAIMS] == ["ojas", "q450", "plug-in"]
 if __name__ == "__main__":

@@ -41,7 +41,7 @@ def lift(tmp_path, monkeypatch):
         "        self.action = np.array([thrust, 0.0, 0.0, 0.0])\n"
         "    def predict(self, observation, state=None, episode_start=None, deterministic=True):\n"
         "        return self.action, None\n"
-        "def search_space(env):\n"
+        "def tuning_space(env):\n"
         "    return {'thrust': GainRange(4.0, 3.0, 34.0)}\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
@@ -160,7 +160,7 @@ def test_a_controller_without_ranges_says_so(monkeypatch):
     artde_gym.register_controller("mine", "somewhere:make")
     with pytest.raises(UnknownNameError, match=r"to be tuned is 'mine'.*artde.*tde"):
         tune(["mine"], QUADROTOR, **SHORT)
-    with pytest.raises(UnknownNameError, match="search"):
+    with pytest.raises(UnknownNameError, match="tuning_space"):
         artde_gym.register_controller("mine", "somewhere:make", tuning_space="nowhere")
 
 

@@ -105,9 +105,9 @@ def test_a_killed_training_continues_from_its_last_checkpoint(tmp_path):
     steps = json.loads((newest / "state.json").read_text())["steps"]
     assert steps > 0
     configuration = json.loads((tmp_path / "run.json").read_text())["configuration"]
-    recipe = ResidualConfig(**configuration.pop("recipe"))
+    config = ResidualConfig(**configuration.pop("config"))
     configuration.pop("engine")  # which the environment and its arguments decide
-    training = Training(**{**configuration, "recipe": recipe, "steps": steps + 1})
+    training = Training(**{**configuration, "config": config, "steps": steps + 1})
     train(training, tmp_path)
     assert (
         json.loads((sorted(checkpoints.glob("0*"))[-1] / "state.json").read_text())["interval"] == int(newest.name) + 1
@@ -128,7 +128,7 @@ def test_a_training_has_a_report(tmp_path, quick):
     curve = (tmp_path / "learning_curve.csv").read_text().splitlines()
     text = write_report(tmp_path).read_text()
     assert f"Best of {len(curve) - 1} held-out tests" in text
-    assert "tde+ppo in QuadInfinity-Payload-v0: attitude channel" in text
+    assert "tde+ppo in QuadInfinity-Payload-v0: action mode attitude" in text
     for column in curve[0].split(","):
         assert f">{column}</button>" in text
 

@@ -59,8 +59,8 @@ def _table(cells: list[Any], varied: list[str]) -> Table:
 def _narrow(cells: list[Any], varied: list[str]) -> Table:
     """Return a table with all labels of a cell in one column, one per line, and intervals below their values."""
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
-    table.add_column("cell", overflow="fold")
-    for title in ("falls (95 %)", "RMS error (95 %)"):
+    table.add_column("cell", overflow="fold", min_width=max((len(_short(name)) for name in varied), default=0))
+    for title in ("falls\n(95 %)", "RMS error\n(95 %)"):
         table.add_column(title, justify="right", no_wrap=True)
     for frame in cells:
         shown = [(name, _text(frame.iloc[0][name])) for name in varied]
