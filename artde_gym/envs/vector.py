@@ -236,9 +236,9 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
             allowed = f"{self.own_engine!r}; for engine {engine!r}: gym.make_vec(..., vectorization_mode='sync')"
             raise OptionError("engine", engine, allowed)
 
-    def _replace(self, given: Mapping[str, Any] | Sequence[Mapping[str, Any]]) -> None:
+    def _replace(self, given: Any) -> None:
         """Take other disturbances from now on: for all environments, or a list with those of each."""
-        if isinstance(given, Mapping):
+        if not isinstance(given, (list, tuple)):
             self._disturbances, self._apart = self._parse(given), ()
         elif len(given) == self.num_envs:
             self._apart = [self._parse(one) for one in given]
