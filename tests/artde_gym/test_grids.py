@@ -7,13 +7,14 @@ import math
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
 from artde_gym.cli import app
-from artde_gym.errors import OptionError, UnknownNameError
+from artde_gym.errors import ArtdeGymError, OptionError, UnknownNameError
 from artde_gym.evaluation import evaluate
 from artde_gym.evaluation.statistics import rate
 from artde_gym.evaluation.tasks import Update
@@ -212,6 +213,13 @@ def test_levels_side_by_side_are_each_level_alone() -> None:
         beside = grid.episodes[grid.episodes["scenario"] == str(i)]
         for column in ("seed", "fell", "rmse_deg", "robust_gain_mean", "reward"):
             assert beside[column].tolist() == alone[column].tolist()
+
+
+@pytest.mark.parametrize("wrong", [3, "payload", [{}], [{}, {}, {}], [3, {}]])
+def test_disturbances_of_a_vector_are_a_mapping_or_one_for_each(wrong: Any) -> None:
+    env = gym.make_vec(WALK, 2, vectorization_mode="vector_entry_point", engine="mujoco", duration=0.3)
+    with pytest.raises(ArtdeGymError):
+        env.reset(seed=0, options={"disturbances": wrong})
 
 
 def test_grid_of_the_ground_force_is_the_thesis_force_in_a_scenario() -> None:
