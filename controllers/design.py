@@ -186,12 +186,12 @@ def design(
     return [judge(loop, _of_loop(chosen, loop, law, length), length) for loop in found]
 
 
-def preset_designs(loop: Loop, drive: Drive, *, tuned: bool) -> list[Design]:
-    """Judge a loop at all presets of laws that estimate by time delay: those that tuning found, or the others."""
+def preset_designs(loop: Loop, drive: Drive, chosen: Callable[[str], bool] | None = None) -> list[Design]:
+    """Judge a loop at the presets of laws that estimate by time delay, as far as they are chosen by name: all by default."""
     return [
         judge(loop, _of_loop(entry.gains, loop, law, drive.period), drive.period)
         for (law, preset), entry in drive.presets.items()
-        if law in DELAYED and (preset == "tuned") == tuned
+        if law in DELAYED and (chosen is None or chosen(preset))
     ]
 
 

@@ -49,7 +49,7 @@ class Metric:
         if not (isinstance(self.name, str) and re.fullmatch("[a-z][a-z0-9_]*", self.name)):
             raise OptionError("name of a metric", self.name, "lowercase letters, digits and underscores")
         if self.name in TAKEN:
-            raise OptionError("name of a metric", self.name, f"a new name; these are taken: {', '.join(TAKEN)}")
+            raise OptionError("name of a metric", self.name, f"any name except {', '.join(TAKEN)}")
         check_choice("reduction", self.reduction, get_args(Reduction))
 
 

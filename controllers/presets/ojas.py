@@ -30,6 +30,8 @@ _ARTDE = ArtdeGains(
 _CONSTANT = ConstantGains(_M_BAR, _K_P, _K_D, alpha=_ALPHA, c=0.44, eps=_EPS)
 _ATDE = AtdeGains(_M_BAR, _K_P, _K_D, alpha=_ALPHA, gamma_0=_GAMMA, c_floor=_FLOOR, c_start=_FLOOR, eps=_EPS)
 
+STIFF_ACTUATORS = "rotor"
+"""Actuator model from whose limit the stiff preset follows."""
 STIFF_M_BAR = 0.077
 """0.85 of the limit 0.0909 along the walk: valid still where all inertias are 15 % smaller than those of the model."""
 _STIFF = (
