@@ -187,7 +187,7 @@ def design(
 
 
 def preset_designs(loop: Loop, drive: Drive, chosen: Callable[[str], bool] | None = None) -> list[Design]:
-    """Judge a loop at the presets of laws that estimate by time delay, as far as they are chosen by name: all by default."""
+    """Judge a loop at the chosen presets, by default all, of laws that estimate by time delay."""
     return [
         judge(loop, _of_loop(entry.gains, loop, law, drive.period), drive.period)
         for (law, preset), entry in drive.presets.items()

@@ -1,4 +1,4 @@
-"""Replays of an evaluation's episodes, or of episodes that nobody has run yet."""
+"""Replays of an evaluation's episodes, or of episodes that were not run before."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ Rows = NDArray[np.int64]
 
 
 class _State(NamedTuple):
-    """What each policy remembers, the actions of all rows, and the rows whose episodes have ended."""
+    """State of each policy, actions of all rows, and the rows whose episodes have ended."""
 
     policies: list[Any]
     actions: Array

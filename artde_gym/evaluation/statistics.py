@@ -66,7 +66,7 @@ def improvement(ours: ArrayLike, theirs: ArrayLike) -> Estimate:
 
 
 def change(ours: ArrayLike, theirs: ArrayLike) -> Estimate:
-    """By how many percent the mean of ours is above that of theirs, for values that are no pairs."""
+    """Compute by how many percent the mean of unpaired values is above that of others."""
     a, b = _finite(ours), _finite(theirs)
     value = 100.0 * (float(a.mean() / b.mean()) - 1.0) if len(a) and len(b) else np.nan
     few = min(len(a), len(b))

@@ -44,7 +44,7 @@ class Take(NamedTuple):
 
     @property
     def motion(self) -> Motion:
-        """What is seen of it.
+        """Motion of the episode.
 
         Raises:
             OptionError: if its environment does not tell poses.
@@ -56,7 +56,7 @@ class Take(NamedTuple):
 
     @property
     def disturbances(self) -> dict[str, Any]:
-        """What was drawn, as the grammar writes it."""
+        """Sampled disturbances in the grammar."""
         return nested({key: value for key, value in self.row.items() if key.startswith("disturbance.")})
 
 

@@ -72,7 +72,7 @@ def write(out: Path, pictures: Iterator[Picture], fps: float) -> None:
     """Write frames of one size to a file, completely or not at all; PNG takes the first one.
 
     Raises:
-        OptionError, StoreError: as of `check`.
+        OptionError, StoreError: as `check`.
     """
     check(out)
     check_replaceable(out)

@@ -8,8 +8,8 @@ half a loop at full speed (6 to 16 s), since a robot is easier to topple in some
 loss is varied, it is the front left rotor's, from such a time on.
 
 A level counts as survived if the *observed* share of episodes without a fall is at least `survival`. The bracket holds
-the point where the observed share crosses it, for these seeds. What n episodes say about the true share is Wilson's
-95 % interval at both ends of the bracket: with 18 of 20 survived it is 70 to 97 %. Seeds are the same at every level
+the point where the observed share crosses it, for these seeds. The true share lies, with 95 %, in Wilson's interval at
+both ends of the bracket: with 18 of 20 survived it is 70 to 97 %. Seeds are the same at every level
 and for every controller, so that two frontiers differ by the controllers and not by luck of the draw; they are one
 sample of the variation nonetheless. Levels off a controller's path through the bisection are not run: survival that
 falls and rises again between them stays unseen. With `grid`, every level is run with every controller, episode by

@@ -28,7 +28,7 @@ class Judged(NamedTuple):
 
 
 class WorldTable:
-    """What happened in the worlds that all of some controllers have met: tables of one row a world, one column each.
+    """Outcomes in the worlds that all of some controllers have met: tables of one row a world, one column each.
 
     Args:
         episodes: with columns `world` and `controller`.
@@ -50,12 +50,12 @@ class WorldTable:
 
     @functools.cached_property
     def fell(self) -> pd.DataFrame:
-        """Whether the episode ended in a fall."""
+        """True if the episode ended in a fall."""
         return self.metric("fell").astype(bool)
 
     @functools.cached_property
     def duration(self) -> pd.DataFrame:
-        """How long the episode was (s)."""
+        """Duration of the episode (s)."""
         return self.metric("duration_s")
 
     def metric(self, name: str) -> pd.DataFrame:

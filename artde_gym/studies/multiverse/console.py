@@ -1,4 +1,4 @@
-"""What a multiverse has found as tables for a terminal."""
+"""Tables of a multiverse for a terminal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which factors decide: a small tree over the factors, with its accuracy on worlds that it has not seen."""
+"""Deciding factors: a small tree over the factors, with its accuracy on held-out worlds."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Node:
 
 @dataclasses.dataclass(frozen=True)
 class Deciding:
-    """What decides between classes.
+    """Factors that decide between classes.
 
     Attributes:
         classes: in the order of `Node.counts`.

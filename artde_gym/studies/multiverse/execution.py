@@ -57,7 +57,7 @@ def multiverse(
         on_progress: called with what goes on ("worlds checked", "episodes", ...) and how far it is.
 
     Returns:
-        What there is; `complete` is False after an interruption (Ctrl-C), with all finished episodes in it.
+        The multiverse; `complete` is False after an interruption (Ctrl-C), with all finished episodes in it.
 
     Raises:
         UnknownNameError, OptionError, DisturbanceError, GainError: for a bad design, before the first episode.

@@ -29,10 +29,10 @@ _GAINS, _KWARGS = "gains.", "env_kwargs."
 
 @dataclasses.dataclass(frozen=True)
 class Multiverse:
-    """What a multiverse has found so far.
+    """Results of a multiverse so far.
 
     Attributes:
-        episodes: one row a world and controller, as of `read_sweep`, with columns `world` and `factor.<name>`.
+        episodes: one row a world and controller, as `read_sweep` gives them, with columns `world` and `factor.<name>`.
         design: of the worlds.
         folder: where they are stored.
         complete: False while episodes are missing.
@@ -84,7 +84,7 @@ class Multiverse:
         return self._deciding(verdict.claim.text, {world: said[value] for world, value in outcomes if value in said})
 
     def deciding_survival(self, controller: str) -> Deciding | None:
-        """Return which factors decide about the survival of a controller; errors as of `deciding`."""
+        """Return which factors decide about the survival of a controller; errors as `deciding`."""
         rows: pd.DataFrame = self.episodes.loc[self.episodes["controller"] == controller]
         ended = zip(rows["world"].tolist(), rows["fell"].tolist(), strict=True)
         return self._deciding(f"survival of {controller}", {world: FATES[bool(fell)] for world, fell in ended})

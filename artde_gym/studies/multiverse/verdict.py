@@ -16,7 +16,7 @@ from artde_gym.studies.multiverse.claims import OUTCOMES, Outcome, WorldClaim, W
 
 @dataclasses.dataclass(frozen=True)
 class Verdict:
-    """What worlds say of a claim.
+    """Verdict of all worlds on a claim.
 
     Attributes:
         worlds: numbers of those that have run.

@@ -265,7 +265,7 @@ def _upright(result: Result, scenario: str, controller: str) -> pd.DataFrame:
 
 
 def _within(estimates: Collection[Estimate], most: float) -> Outcome:
-    """Whether all differences are at most so large (%)."""
+    """Return True if all differences are at most so large (%)."""
     if all(-most <= estimate.low and estimate.high <= most for estimate in estimates):
         return "holds"
     return "does not hold" if any(one.low > most or one.high < -most for one in estimates) else "undecided"

@@ -2,7 +2,7 @@
 
 Beside the thesis' controllers and their rivals, an ablation can be run: plain TDE at constant extra stiffness and
 damping (`tde+kd`), as much of it as ARTDE's robust gain c came to *in the same scenario*, on average over its episodes.
-What ARTDE is better than that, it owes to adaptation. Claims on how much is survived take whole grids of `frontier`.
+An advantage of ARTDE over that is due to adaptation. Claims on how much is survived take whole grids of `frontier`.
 
     <out>/                       the folder of `evaluate`, all controllers but the ablation
     <out>/ablation/<scenario>/   one of the ablation in each scenario, at a gain of its own
@@ -101,7 +101,7 @@ def reproduce(
         robot: a robot's title, such as "biped" or "quadrotor".
         out: folder to store everything in; the same call continues an interrupted one.
         scenarios: of this robot, in place of all that its kit names.
-        controllers: likewise, without the ablation.
+        controllers: in place of the kit's, without the ablation.
         ablation: whether to run it too; "artde" must be among the controllers then.
         curves: whether to run the grids of claims in these scenarios, too.
         episodes: seeded episodes of each controller in each scenario; None for 10, or 4 where walks run singly.
