@@ -189,7 +189,14 @@ def test_it_is_made_by_the_vector_entry_point() -> None:
     assert env.single_observation_space == alone.observation_space
     assert env.single_action_space == alone.action_space
     assert env.observation_space.shape == (3, alone.observation_space.shape[0])
-    for name in ("robot_name", "control_period", "nominal_robot", "observation_layout", "action_layout", "tracking"):
+    for name in (
+        "robot_name",
+        "control_period",
+        "nominal_robot",
+        "observation_layout",
+        "action_layout",
+        "metrics_spec",
+    ):
         assert env.get_attr(name) == (getattr(alone, name),) * 3
     assert make(2, autoreset_mode="Disabled").metadata["autoreset_mode"] is AutoresetMode.DISABLED
     assert "Actions" not in str(BipedPushVectorEnv.__doc__)

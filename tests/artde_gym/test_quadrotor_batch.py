@@ -166,7 +166,14 @@ def test_it_is_made_by_the_vector_entry_point() -> None:
     assert env.single_observation_space == alone.observation_layout.box(np.dtype("float32"))
     assert make(2).single_observation_space == alone.observation_space
     assert make(2).single_action_space == alone.action_space
-    for name in ("robot_name", "control_period", "nominal_robot", "observation_layout", "action_layout", "tracking"):
+    for name in (
+        "robot_name",
+        "control_period",
+        "nominal_robot",
+        "observation_layout",
+        "action_layout",
+        "metrics_spec",
+    ):
         assert env.get_attr(name) == (getattr(alone, name),) * 4096
     env.close()
 
