@@ -20,13 +20,17 @@ from typing import Any, Literal, NamedTuple
 from artde_gym.registry import Registry
 from artde_gym.scenarios import Scenario
 
+PAYLOAD = "payload"
+"""The site at which a payload is pushed, of robots with the capability "cable"."""
+
 Capability = Literal[
-    "actuators", "armature", "contact", "effects", "encoders", "feet", "flight", "joints", "legs", "mass", "payload",
-    "rotors", "sensors", "sites", "torque_limit",
+    "actuators", "armature", "cable", "contact", "effects", "encoders", "feet", "flight", "joints", "legs", "mass",
+    "payload", "rotors", "sensors", "sites", "torque_limit",
 ]  # fmt: skip
 """Properties of a robot, and of its environments, that kinds of disturbances ask for.
 
-"effects" are those of registered kinds: the environments apply `artde_gym.disturbances.effects.Effects`.
+"effects" are those of registered kinds: the environments apply `artde_gym.disturbances.effects.Effects`. "cable": a
+payload may hang on one.
 """
 Harder = Literal["larger", "smaller"]
 
@@ -158,7 +162,8 @@ class RobotKit:
     @property
     def sites(self) -> tuple[str, ...]:
         """Names of the places at which it can be pushed."""
-        return tuple(name for name, _, _ in self.model().sites)
+        own = tuple(name for name, _, _ in self.model().sites)
+        return (*own, PAYLOAD) if "cable" in self.capabilities else own
 
 
 ROBOTS: Registry[RobotKit] = Registry("robot", "artde_gym.robots", lambda kit: {kit.name: kit})

@@ -123,6 +123,7 @@ def disturbances() -> Entries:
                         robot: _plain(value) for robot, value in other_defaults(kind, parameter).items()
                     },
                     "text": parameter.text,
+                    **({} if parameter.requires is None else {"requires": parameter.requires}),
                 }
                 for parameter in kind.parameters
             ],

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
+from numbers import Real
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from artde_gym.arrays import Array
@@ -53,6 +55,9 @@ A value is (n,), or (n, size); a word is its place among those allowed. The func
 """
 
 
+NOTHING: Mapping[str, Any] = MappingProxyType({})
+
+
 @dataclasses.dataclass(frozen=True)
 class Parameter:
     """One value of a disturbance.
@@ -64,6 +69,8 @@ class Parameter:
         nonzero: whether a vector of zeros is refused.
         integer: whether the value is a whole number.
         words: allowed words, or "site" or "joint" for the names that the robot has; rotors count as joints.
+        requires: the capability without which a robot does not know this parameter; None if the kind's own is enough.
+        with_other: another parameter, and the default where that one is given and not zero.
     """
 
     name: str
@@ -76,6 +83,8 @@ class Parameter:
     nonzero: bool = False
     integer: bool = False
     words: tuple[str, ...] | str = ()
+    requires: Capability | None = None
+    with_other: tuple[str, Any] | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -99,8 +108,20 @@ class Kind:
     one_of: tuple[str, ...] = ()
     effect: Effect | None = None
 
-    def default_of(self, parameter: Parameter, robot: str | None) -> Any:
-        """Return a parameter's default for a robot, or for none in particular."""
+    def parameters_for(self, robot: str | None) -> tuple[Parameter, ...]:
+        """Return the parameters that a robot knows; all of them for no robot in particular."""
+        if robot is None:
+            return self.parameters
+        able = ROBOTS[robot].capabilities
+        return tuple(one for one in self.parameters if one.requires is None or one.requires in able)
+
+    def default_of(self, parameter: Parameter, robot: str | None, given: Mapping[str, Any] = NOTHING) -> Any:
+        """Return a parameter's default for a robot, or for none in particular, beside `given` parameters."""
+        if parameter.with_other is not None:
+            other, default = parameter.with_other
+            value = given.get(other, 0.0)
+            if not (isinstance(value, Real) and value == 0):
+                return default
         own = {} if robot is None else ROBOTS[robot].defaults
         return own.get(f"{self.name}.{parameter.name}", parameter.default)
 
@@ -112,6 +133,7 @@ class Kind:
 
 ALL = "all"
 NEVER = 1e9  # s
+HOOK = (0.0, 0.0, -0.05)  # m, where a cable begins
 SHAPES = ("half_sine", "double_hump")
 TRIGGERS = ("contact", "plan")
 
@@ -129,7 +151,8 @@ OWN: dict[str, Kind] = {
     for kind in (
         Kind(
             "payload",
-            "A ball fixed to the base.",
+            "A ball fixed to the base, or hanging under it on a cable, which neither stretches nor weighs anything and "
+            "goes slack; see `artde_gym.sim.cable`. While it is there, the site `payload` is where it can be pushed.",
             (
                 Parameter("mass", "kg", 1e-3, 5.0, None, "mass of the ball"),
                 Parameter(
@@ -138,11 +161,15 @@ OWN: dict[str, Kind] = {
                     -0.5,
                     0.5,
                     (0.0, 0.0, 0.16),
-                    "its centre in the base frame",
+                    "its centre in the base frame; with a cable, the hook's place",
                     size=3,
+                    with_other=("cable", HOOK),
                 ),
                 _time("attach", 0.0, "from when; at 0 the episode starts in balance with it"),
                 _time("drop", NEVER, "until when; not after `attach`, it never appears"),
+                Parameter(
+                    "cable", "m", 0.0, 2.0, 0.0, "length of the cable; 0 for a ball that is fixed", requires="cable"
+                ),
             ),
             scalar="mass",
             requires="payload",
@@ -448,12 +475,20 @@ def page() -> str:
             default = f"`{parameter.default}`"
             if parameter.default is None:
                 default = "one of these" if parameter.name in kind.one_of else "required"
+            if parameter.with_other is not None:
+                default += f"; with `{parameter.with_other[0]}`: `{parameter.with_other[1]}`"
             default += "".join(f"; {robot}: `{value}`" for robot, value in other_defaults(kind, parameter).items())
-            text = parameter.text + (" (what a bare number stands for)" if parameter.name == kind.scalar else "")
+            text = parameter.text + ("" if parameter.requires is None else f" ({_known_by(kind, parameter)} only)")
+            text += " (what a bare number stands for)" if parameter.name == kind.scalar else ""
             row = (f"`{parameter.name}`", parameter.unit, allowed(parameter), default, text)
             lines.append("| " + " | ".join(row) + " |")
         lines.append("")
     return INTRODUCTION + "\n".join(lines)
+
+
+def _known_by(kind: Kind, parameter: Parameter) -> str:
+    """Name the robots that know a parameter."""
+    return ", ".join(robot for robot in ROBOTS if kind.honored_by(robot) and parameter in kind.parameters_for(robot))
 
 
 def parameters_of(kind: str, given: Any) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, cast
 
 import gymnasium as gym
 import numpy as np
@@ -25,6 +25,7 @@ from artde_gym.envs.options import disturbances_in, warn_of_idle
 from artde_gym.envs.quadrotor_sensors import Measurement, Sensors
 from artde_gym.envs.view import View
 from artde_gym.errors import OptionError
+from artde_gym.kit import PAYLOAD
 from artde_gym.multibody.spec import Vector
 from artde_gym.robots.q450 import model as robot
 from artde_gym.robots.q450 import task
@@ -33,6 +34,7 @@ from artde_gym.robots.q450.rotors import Rotors
 from artde_gym.sim.engine import Camera, Engine
 from artde_gym.sim.factory import EngineName, make_engine, resolve_engine
 from artde_gym.sim.rotation import matrix
+from artde_gym.sim.sling import Sling
 
 TIME_STEP = 0.001  # s, of the physics
 STEPS = 5  # physics steps from one grid point to the next
@@ -122,9 +124,9 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self.action_space = task.ACTION.box()
         self._low, self._high = self.action_space.low, self.action_space.high
         self.engine_name = resolve_engine(engine)
-        self._engine: Engine = make_engine(
-            self.engine_name, self.nominal_robot, TIME_STEP, renders=render_mode is not None
-        )
+        engine_alone = make_engine(self.engine_name, self.nominal_robot, TIME_STEP, renders=render_mode is not None)
+        self._sling = Sling(engine_alone)
+        self._engine = cast(Engine, self._sling)
         self.view = View(self._engine, CAMERA._replace(width=width, height=height), self.control_period, SHARE, LEEWAY)
         self.metadata = {**self.metadata, **self.view.metadata}
         self._engine.place(START, _NO_JOINTS)
@@ -254,6 +256,8 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
     def _drag(self) -> Vector:
         """Force of the air until the next grid point (N), body axes."""
         state, (xx, xy, xz, yx, yy, yz, zx, zy, zz) = self._state, self._rot
+        if self._wind is not None:
+            self._sling.wind = self._wind.at(self._sling.site(PAYLOAD)) if self._sling.length else _NOTHING
         wx, wy, wz = _NOTHING if self._wind is None else self._wind.next(state.position)
         vx, vy, vz = state.velocity
         x, y, z = robot.DRAG * (wx - vx), robot.DRAG * (wy - vy), robot.DRAG * (wz - vz)

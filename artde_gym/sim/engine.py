@@ -171,10 +171,10 @@ class Engine(World, Protocol):
         """Whole force of the ground on each foot during the last step, (feet, 3) (N, world axes)."""
         ...
 
-    def render(self, camera: Camera) -> NDArray[np.uint8]:
+    def render(self, camera: Camera, load: Vector | None = None) -> NDArray[np.uint8]:
         """A picture, (height, width, 3), of robot and payload on the ground of `artde_gym.sim.ground`.
 
-        It changes nothing.
+        It changes nothing. `load` is where the payload is in place of the engine's own (m), such as one on a cable.
 
         Raises:
             OptionError: where the engine cannot draw on this machine.

@@ -69,7 +69,9 @@ KIT = RobotKit(
             main=("Q1", "Q1-calm", "Q1-gale"),
         ),
     ),
-    capabilities=frozenset({"actuators", "effects", "flight", "mass", "payload", "rotors", "sensors", "sites"}),
+    capabilities=frozenset(
+        {"actuators", "cable", "effects", "flight", "mass", "payload", "rotors", "sensors", "sites"}
+    ),
     defaults={"payload.position": (0.01, 0.0, -0.1), "push.body": "body"},
     scenarios=_SCENARIOS,
     reproduced=(

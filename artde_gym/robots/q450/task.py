@@ -14,6 +14,7 @@ from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.ground_effect import thrust_gain
 from artde_gym.disturbances.numeric import Words
 from artde_gym.disturbances.wind import GRID
+from artde_gym.kit import PAYLOAD
 from artde_gym.layout import Field, Layout
 from artde_gym.multibody.dynamics import GRAVITY
 from artde_gym.multibody.spec import Vector
@@ -176,7 +177,7 @@ REWARD_SCALES: dict[str, float] = {
 }
 """The reward of a control period L is L times the sum of these scales times their terms."""
 FALL_REASONS = ("ground", "inverted", "bounds")
-WORDS: Words = {"site": tuple(name for name, _, _ in robot.q450().sites), "joint": robot.ROTORS}
+WORDS: Words = {"site": (*(name for name, _, _ in robot.q450().sites), PAYLOAD), "joint": robot.ROTORS}
 
 Number = TypeVar("Number", float, Array)
 Vector3 = tuple[Number, Number, Number]
