@@ -38,13 +38,15 @@ Harder = Literal["larger", "smaller"]
 class Environment(NamedTuple):
     """An environment as Gymnasium registers it; entry points are "module:class".
 
-    `main` names the scenarios that `artde-gym evaluate` runs in it where none is asked for.
+    `main` names the scenarios that `artde-gym evaluate` runs in it where none is asked for; `frontier` is its standard
+    test of a frontier, None for the robot's.
     """
 
     env_id: str
     entry_point: str
     vector_entry_point: str | None = None
     main: tuple[str, ...] = ()
+    frontier: FrontierTest | None = None
 
 
 class Range(NamedTuple):
@@ -137,7 +139,7 @@ class RobotKit:
         scenarios: by which it is evaluated.
         reproduced: names of the scenarios that `reproduce` runs, and of the controllers in them.
         reported: what a publication reports of its scenarios, by their name there (`Scenario.thesis`).
-        frontier: its standard test; None if it has none.
+        frontier: its standard test, where an environment has none of its own; None if it has none.
         motion: that pictures in a report show.
         push: of live play; None to push at the first site with 10 N.
         report: module with `reference(kwargs)` and `figures(episode)`, see `artde_gym.report.robot`; None for the

@@ -52,6 +52,25 @@ class Effort:
 
 
 @dataclasses.dataclass(frozen=True)
+class Watched:
+    """A size that has no reference of its own, such as a swing.
+
+    Attributes:
+        name: as columns spell it.
+        unit: in which it is reported, likewise.
+        scale: how many of it make one SI unit.
+        size: observations and told entries of `info` -> values (...), in SI; NaN where there is none.
+        band: value that counts as settled after a push, in SI; infinite where settling means nothing.
+    """
+
+    name: str
+    unit: str
+    scale: float
+    size: Callable[[Fields], Array]
+    band: float
+
+
+@dataclasses.dataclass(frozen=True)
 class Tracking:
     """Everything that metrics have to know of an environment.
 
@@ -66,7 +85,8 @@ class Tracking:
         near: share of the field's range that counts as at the bound; a lag approaches it without reaching it.
         tde_errors: column -> diagnostic of a policy that is an error of time-delay estimation.
         means: column -> diagnostic of a policy, one number, whose mean is reported.
-        told: entries of `info` that belong into an episode's traces too.
+        told: entries of `info` that belong into an episode's traces too, numbers each.
+        watched: what else is measured, from observations and told entries.
         speed: observations -> speed of travel (...), m/s, where a cost of transport makes sense.
     """
 
@@ -80,6 +100,7 @@ class Tracking:
     tde_errors: Mapping[str, str]
     means: Mapping[str, str]
     told: tuple[str, ...] = ()
+    watched: tuple[Watched, ...] = ()
     speed: Callable[[Fields], Array] | None = None
 
     @property

@@ -135,10 +135,11 @@ def disturbances() -> Entries:
 def frontiers() -> Entries:
     """Every path that a frontier varies within a range of its own."""
     return [
-        {"name": path, "robot": robot, **values._asdict()}
+        {"name": path, "robot": robot, "environment": entry.env_id, **values._asdict()}
         for robot, kit in ROBOTS.items()
-        if kit.frontier is not None
-        for path, values in kit.frontier.ranges.items()
+        for entry in kit.environments
+        if (test := entry.frontier or kit.frontier) is not None
+        for path, values in test.ranges.items()
     ]
 
 

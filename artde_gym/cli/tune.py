@@ -37,6 +37,9 @@ def tune(
     held_out: Annotated[
         int, typer.Option(help="Seeded episodes of the comparison in the end, none of them seen.")
     ] = 20,
+    metric: Annotated[
+        str | None, typer.Option(help="Column of episodes.csv to make small. Default: the environment's first error.")
+    ] = None,
     seed: Seed = 0,
     workers: Workers = None,
     out: Out = None,
@@ -57,6 +60,7 @@ def tune(
             trials=trials,
             episodes=episodes,
             held_out=held_out,
+            metric=metric,
             seed=seed,
             workers=processes(workers),
             out=folder_of(out),

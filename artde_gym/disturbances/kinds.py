@@ -309,6 +309,13 @@ OWN: dict[str, Kind] = {
             requires="actuators",
         ),
         Kind(
+            "cable_delay",
+            "The cable of a payload is measured late, as by a camera: vector, rate, and whether the load hangs.",
+            (Parameter("samples", "1", 0, 20, None, "by so many control periods", integer=True),),
+            scalar="samples",
+            requires="cable",
+        ),
+        Kind(
             "motor_lag",
             "Torques, or thrusts of rotors, follow commands as a first-order lag.",
             (Parameter("time_constant", "s", 0.0, 1.0, None, "of the lag; for rotors in place of their own 0.035 s"),),

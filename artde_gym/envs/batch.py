@@ -126,7 +126,7 @@ class BatchEnv(Counted, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
     def _score(self, truth: Array) -> tuple[dict[str, Array], Sequence[Mask]]:
         """The terms of the reward, and where each reason of a fall holds."""
 
-    def _tell(self) -> dict[str, Array]:
+    def _tell(self) -> Columns:
         """More entries of `info`, by name, one value an environment."""
         return {}
 

@@ -29,7 +29,6 @@ from artde_gym.kit import PAYLOAD
 from artde_gym.multibody.spec import Vector
 from artde_gym.robots.q450 import model as robot
 from artde_gym.robots.q450 import task
-from artde_gym.robots.q450.infinity import START
 from artde_gym.robots.q450.rotors import Rotors
 from artde_gym.sim.engine import Camera, Engine
 from artde_gym.sim.factory import EngineName, make_engine, resolve_engine
@@ -93,6 +92,9 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
     robot_name: ClassVar[str] = "q450"
     tracking = task.TRACKING
     fall_reasons: ClassVar[Sequence[str]] = task.FALL_REASONS
+    reward_scales: ClassVar[Mapping[str, float]] = task.REWARD_SCALES
+    default_disturbances: ClassVar[Mapping[str, Any]] = task.DEFAULT_DISTURBANCES
+    lift: ClassVar[float] = 0.0
     words = task.WORDS
 
     @known_arguments
@@ -111,25 +113,28 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise OptionError("render_mode", render_mode, "None, 'rgb_array'")
         self.render_mode = render_mode
-        self._disturbances = task.parse(task.DEFAULT_DISTURBANCES if disturbances is None else disturbances)
+        self._disturbances = task.parse(self.default_disturbances if disturbances is None else disturbances)
         self._ticks = steps_per_period(control_period, GRID)
         self.control_period = self._ticks * GRID
         self.measurement = measurement
         self.duration = duration
-        self._sensors = Sensors(1, measurement, self.control_period, np.float64)
+        self._sensors = Sensors(1, measurement, self.control_period, np.float64, self.observation_layout)
         self.nominal_robot = robot.q450()
-        self._plan = task.plan(duration, self.control_period)
+        self._plan = task.plan(duration, self.control_period, self.lift)
         self._last = len(self._plan) - 1
-        self.observation_space = task.OBSERVATION.box()
+        self.observation_space = self.observation_layout.box()
         self.action_space = task.ACTION.box()
         self._low, self._high = self.action_space.low, self.action_space.high
         self.engine_name = resolve_engine(engine)
         engine_alone = make_engine(self.engine_name, self.nominal_robot, TIME_STEP, renders=render_mode is not None)
         self._sling = Sling(engine_alone)
         self._engine = cast(Engine, self._sling)
-        self.view = View(self._engine, CAMERA._replace(width=width, height=height), self.control_period, SHARE, LEEWAY)
+        x, y, z = CENTRE
+        self._home: Vector = (x, y, z + self.lift)
+        camera = CAMERA._replace(target=self._home, width=width, height=height)
+        self.view = View(self._engine, camera, self.control_period, SHARE, LEEWAY)
         self.metadata = {**self.metadata, **self.view.metadata}
-        self._engine.place(START, _NO_JOINTS)
+        self._engine.place(task.start({}, self.lift), _NO_JOINTS)
         self._placed = self._engine.snapshot()
         self._k, self._over = 0, True  # no step before the first reset
         self._schedule = Schedule({}, TIME_STEP)
@@ -154,7 +159,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self._sample(realised)
         self._begin(realised, draw_keys(self.np_random, task.STREAMS))
         self.view.reset()
-        return self._measure(), self._info(dict.fromkeys(task.REWARD_SCALES, 0.0), (), ())
+        return self._measure(), self._info(dict.fromkeys(self.reward_scales, 0.0), (), ())
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Apply a wrench for one control period.
@@ -172,7 +177,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self._k += 1
         observation = self._measure()
         terms = self._reward_terms(before)
-        reward = self.control_period * total(map(operator.mul, task.REWARD_SCALES.values(), terms.values()))
+        reward = self.control_period * total(map(operator.mul, self.reward_scales.values(), terms.values()))
         falls = self._falls()
         terminated, truncated = any(falls), self._k >= self._last
         self._over = terminated or truncated
@@ -186,7 +191,10 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         step = self.elapsed
         pushes = self._schedule.acting(step)
         path = self._plan[:, :3]
-        return self.view.picture(step * TIME_STEP, CENTRE, pushes, self._realised, path=path, over=self._over)
+        cable = self._sling.curve()
+        return self.view.picture(
+            step * TIME_STEP, self._home, pushes, self._realised, path=path, cable=cable, over=self._over
+        )
 
     def close(self) -> None:
         self._engine.close()
@@ -205,11 +213,11 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         engine = self._engine
         engine.restore(self._placed)
         if "initial_position" in realised:
-            engine.place(task.start(realised), _NO_JOINTS)
+            engine.place(task.start(realised, self.lift), _NO_JOINTS)
         engine.scale_masses(realised.get("mass_error", {}).get("factor", 1.0))
         self._schedule = Schedule(realised, TIME_STEP)
         self._schedule.start(engine)
-        self._rotors = Rotors(realised, task.hover_thrusts(realised), TIME_STEP, self._ticks * STEPS)
+        self._rotors = Rotors(realised, task.hover_thrusts(realised, self.lift), TIME_STEP, self._ticks * STEPS)
         self._wrench = robot.MIXER @ self._rotors.thrusts
         self._wind = Wind(realised["wind"], keys[0]) if "wind" in realised else None
         self._ground_effect = realised.get("ground_effect", {}).get("strength", 0.0)
@@ -217,6 +225,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self._effects.begin(0, realised)
         self._k = 0
         self._over = False
+        self._pulled = 0.0
         self._read()
 
     def _info(self, terms: dict[str, float], falls: Sequence[bool], events: Sequence[str]) -> dict[str, Any]:
@@ -232,6 +241,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         wrenches = thrusts @ robot.MIXER.T
         rows = wrenches.tolist()
         quiet = self._schedule.quiet(first, first + steps)
+        pulled = 0.0
         for start in range(0, steps, STEPS):
             end = start + STEPS
             if self._ground_effect:
@@ -245,8 +255,10 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
                 engine.push_base((drag_x, drag_y, drag_z + u1), (u2, u3, u4))
                 load_base(engine, load, 0)
                 engine.step(_NO_JOINTS)
+                pulled += self._sling.tension
             self._read()
         self._wrench = np.add.reduce(wrenches) / steps
+        self._pulled = pulled * TIME_STEP  # impulse of the cable (N s)
         return events
 
     def _read(self) -> None:
@@ -273,16 +285,20 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         state, rot = self._state, self._rot
         wx, wy, wz = state.angular_velocity
         rates = (rot[i] * wx + rot[3 + i] * wy + rot[6 + i] * wz for i in range(3))
-        observation = np.empty(task.OBSERVATION.size)
+        observation = np.empty(self.observation_layout.size)
         observation[task.MEASURED] = (*state.position, *state.velocity, *rot, *rates)
         plan = self._plan[self._k]
         observation[task.REFERENCE] = plan[:-1]
         observation[task.WRENCH] = self._wrench
         observation[task.THRUST] = self._rotors.thrusts
         observation[task.PHASE] = plan[-1]
+        self._look(observation)
         if not self._sensors.ideal:
             self._sensors.measure(observation[:, None], np.array([self._k]))
         return observation
+
+    def _look(self, observation: Array) -> None:
+        """Fill in what else is observed."""
 
     def _reward_terms(self, before: Array) -> dict[str, float]:
         plan = self._plan[self._k, :6].tolist()
@@ -293,6 +309,6 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         effort, smoothness = float(thrusts.dot(thrusts)), float(change.dot(change))
         return task.reward_terms(error, velocity_error, self._rot[8], effort, smoothness, math.exp)
 
-    def _falls(self) -> tuple[bool, bool, bool]:
+    def _falls(self) -> tuple[bool, ...]:
         spin = math.hypot(*self._state.angular_velocity) ** 2
         return task.falls(self._state.position, self._rot[8], spin)

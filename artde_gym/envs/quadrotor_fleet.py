@@ -51,17 +51,20 @@ class Fleet:
         n: how many.
         steps: grid steps of a control period.
         dtype: of all numbers.
+        lift: by which the path is raised (m).
 
     Attributes:
         bodies: their motion.
         thrusts: of the rotors now (4, n) (N).
+        cables: with loads; None before a vehicle has had one.
+        pulled: impulse of each cable during the last control period (n,) (N s).
         wrenches: mean [u1, u2, u3, u4] of the last control period (4, n) (N, Nm), without the gain near the ground.
     """
 
-    def __init__(self, n: int, steps: int, dtype: DTypeLike) -> None:
+    def __init__(self, n: int, steps: int, dtype: DTypeLike, lift: float = 0.0) -> None:
         self.bodies = RigidBodies(n, dtype)
         self.thrusts, self.wrenches = np.zeros((4, n), dtype), np.zeros((4, n), dtype)
-        self._steps = steps
+        self._steps, self._lift = steps, lift
         self._step = 0  # since the fleet was built
         self._begun = np.zeros(n, np.int64)  # at which step each episode began
         self._agenda: list[list[_Event]] = [[] for _ in range(n)]  # of each vehicle, the next event last
@@ -81,7 +84,7 @@ class Fleet:
         self._at_load = np.zeros((0, n), np.bool_)  # which of them push the payload
         self._carries = np.zeros(n, np.bool_)  # a payload that is fixed
         self.cables: Cables | None = None  # once a vehicle needs one
-        self._pulled = np.zeros(n, dtype)  # mean tension of the last control period (N)
+        self.pulled = np.zeros(n, dtype)
         self._effects = Effects(n, task.WORDS)
 
     def begin(self, vehicle: int, realised: Mapping[str, Any], key: np.uint64) -> None:
@@ -103,9 +106,9 @@ class Fleet:
         self._fix(vehicle, bare, False)
         if self.cables is not None:
             self.cables.clear(vehicle)
-        self._pulled[vehicle] = 0.0
+        self.pulled[vehicle] = 0.0
         payload = realised.get("payload")
-        start: Vector = task.start(realised)
+        start: Vector = task.start(realised, self._lift)
         if payload is not None and payload["drop"] > payload["attach"]:
             attach, drop = self._changes(vehicle, bare, payload)
             if payload["attach"] == 0:
@@ -152,7 +155,7 @@ class Fleet:
             part[..., vehicles] = before
 
     def _moving(self) -> tuple[Array, ...]:
-        loads = () if self.cables is None else (*self.cables.motion(), self._pulled)
+        loads = () if self.cables is None else (*self.cables.motion(), self.pulled)
         return *self.bodies.motion(), self.thrusts, self.wrenches, *loads
 
     def advance(self, commands: Array) -> dict[int, list[str]]:
@@ -162,7 +165,7 @@ class Fleet:
         goals = aims * self._left
         noise = self._noise() if self._windy else None
         total = np.zeros_like(self.thrusts)
-        self._pulled = np.zeros_like(self._pulled)
+        self.pulled = np.zeros_like(self.pulled)
         for step in range(self._steps):
             self._drift(GRID if step else 0.5 * GRID)
             if self._step >= self._soonest:
@@ -196,10 +199,10 @@ class Fleet:
         for push, at_load in zip(self._pushes, self._at_load, strict=True):
             np.add(force, push, out=force, where=at_load)
         cables.kick(self.bodies, GRID, force, self._wind_at(cables.position) if self._windy else None)
-        self._pulled += cables.tension / self._steps
+        self.pulled += GRID * cables.tension
 
     def _begin_rotors(self, vehicle: int, realised: Mapping[str, Any]) -> None:
-        hover = task.hover_thrusts(realised)
+        hover = task.hover_thrusts(realised, self._lift)
         self.thrusts[:, vehicle] = hover
         self.wrenches[:, vehicle] = robot.wrench(*hover)
         constant = realised.get("motor_lag", {}).get("time_constant", robot.ROTOR_LAG)

@@ -15,7 +15,7 @@ from artde_gym.disturbances.schedule import Push
 from artde_gym.errors import OptionError
 from artde_gym.multibody.spec import Vector
 from artde_gym.sim.camera import Camera
-from artde_gym.sim.engine import Engine
+from artde_gym.sim.engine import PAYLOAD_LOOK, Engine
 
 RATE = 30.0  # pictures a simulated second
 MAX_FPS, SLOW_FPS = 100.0, 50.0  # frames/s: what a video can have, and has in slow motion where steps are shorter
@@ -71,6 +71,7 @@ class View:
         disturbances: Mapping[str, Any],
         *,
         path: ArrayLike | None = None,
+        cable: Sequence[Vector] = (),
         over: bool = False,
     ) -> NDArray[np.uint8]:
         """The picture at a time: a new one `RATE` times a second, and in the end; in between the last one.
@@ -82,6 +83,7 @@ class View:
             pushes: that act now.
             disturbances: of the episode, realised.
             path: (n, 3), drawn as a line (m).
+            cable: points from the hook to the payload (m), none without a cable.
             over: whether the episode has ended.
         """
         key = (int(time_s * RATE + 1e-6), over)
@@ -90,6 +92,8 @@ class View:
             drawn = Image.fromarray(self._engine.render(camera))
             if path is not None:
                 _line(drawn, camera.pixels(path), PATH)
+            if cable:
+                _rope(drawn, camera, cable)
             for push in pushes:
                 _arrow(drawn, camera, self._engine.site(push.site), push.force)
             acting = [f"push {np.linalg.norm(push.force):.3g} N" for push in pushes]
@@ -163,6 +167,17 @@ def _line(picture: Image.Image, points: Array, colour: tuple[int, int, int]) -> 
     whole = np.isfinite(points).all(axis=1)
     ImageDraw.Draw(mask).line([*map(tuple, (FINER * points[whole]).tolist())], 150, FINER)
     picture.paste(colour, None, mask.reduce(FINER))
+
+
+def _rope(picture: Image.Image, camera: Camera, points: Sequence[Vector]) -> None:
+    """A cable up to the surface of its load."""
+    ends = np.linalg.norm(np.subtract(points, points[-1]), axis=1) > PAYLOAD_LOOK
+    seen = camera.pixels(np.asarray(points)[ends]) if ends.any() else np.zeros((0, 2))
+    if len(seen) > 1 and np.isfinite(seen).all():
+        mask = Image.new("L", (FINER * picture.width, FINER * picture.height))
+        wide = max(2, round(FINER * picture.height / 240))
+        ImageDraw.Draw(mask).line([*map(tuple, (FINER * seen).tolist())], 255, wide, "curve")
+        picture.paste(INK, None, mask.reduce(FINER))
 
 
 def _write(picture: Image.Image, lines: Sequence[str]) -> None:

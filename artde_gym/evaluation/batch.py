@@ -66,10 +66,13 @@ def run_batch(
     traces = _Traces(env, traced, stride)
     traces.observe(0, observation, info)
     block: list[Array] = []
+    told: list[dict[str, Array]] = []
+    names = env.tracking.told if env.tracking.watched else ()
     insides: list[dict[str, Array]] = []
     state, episode_start, k = None, live, 0
     while live.any():
         block.append(np.array(observation))
+        told.append({name: np.array(info[name]) for name in names})
         action, state = policy.predict(observation, state=state, episode_start=episode_start, deterministic=True)
         if diagnose is not None and k % looks == 0:
             insides.append(copied(diagnose(state)))
@@ -81,10 +84,11 @@ def run_batch(
         episode_start = terminated | truncated
         ended = live & episode_start
         if ended.any() or len(block) * len(seeds) >= BLOCK:
-            metrics.add(k - len(block), split(np.array(block)), stack(insides), live)
-            block, insides = [], []
+            metrics.add(k - len(block), split(np.array(block)) | stack(told), stack(insides), live)
+            block, told, insides = [], [], []
         if ended.any():
-            metrics.add(k, split(observation[None]), None, ended)  # nothing is decided there any more
+            last = {name: np.array(info[name])[None] for name in names}
+            metrics.add(k, split(observation[None]) | last, None, ended)  # nothing is decided there any more
             steps[ended] = k
             reasons |= {int(i): fall_reason(info, int(i)) for i in np.flatnonzero(live & terminated)}
             live = live & ~ended

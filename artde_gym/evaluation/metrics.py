@@ -20,6 +20,9 @@ Per axis: `rmse_u_<axis>`, `max_abs_error_u_<axis>`, and for each effort `rms_<e
   in its band, or below its largest value in the 2 s before if that is more; infinite if it never does, as in a fall
   after the event's beginning. NaN where the episode ended too early to tell: before the event, less than 1 s after it,
   or with an error that had stayed there for less than 1 s.
+- `rms_<watched>_<unit>`, `max_<watched>_<unit>`: of what an environment watches beside its errors, such as a swing;
+  `peak_<watched>_<unit>_<push>` and `recovery_time_s_<push>_<watched>`: what a push does to it, as above, but the band
+  is its own alone, and the time infinite also where what is watched ends before it has settled.
 - those of `artde_gym.evaluation.registered`, by name.
 """
 
@@ -36,13 +39,14 @@ from artde_gym.disturbances.kinds import NEVER
 from artde_gym.errors import OptionError
 from artde_gym.evaluation.registered import METRICS, Metric
 from artde_gym.layout import Layout
-from artde_gym.tracking import Fields, Tracked, Tracking
+from artde_gym.tracking import Fields, Tracked, Tracking, Watched
 
 GRAVITY = 9.81  # m/s^2
 BEFORE = 2.0  # s before a disturbance, whose largest error counts as recovered too
 AFTER = 2.0  # s after it, in which its peak is looked for
 HOLD = 1.0  # s, for which a recovered error must stay in its band
 NEAR = 0.1  # m, below which a distance has no cost of transport
+PUSH = "push"  # in front of its number
 END = 2**62  # a sample that no episode reaches
 
 Span = tuple[float, float]
@@ -52,7 +56,7 @@ Mask = NDArray[np.bool_]
 def events_of(disturbances: Mapping[str, Any]) -> dict[str, Span]:
     """Name -> (begin, end) (s) of each push, and of the payload's drop if there is one."""
     events = {
-        f"push{i}": (push["start"], push["start"] + push["duration"])
+        f"{PUSH}{i}": (push["start"], push["start"] + push["duration"])
         for i, push in enumerate(disturbances.get("push", ()))
     }
     payload = disturbances.get("payload", {"attach": 0.0, "drop": NEVER})
@@ -112,6 +116,7 @@ class Metrics:
         names = dict.fromkeys(name for one in events for name in one)
         never = (np.inf, np.inf)
         self._events = {name: _Event([one.get(name, never) for one in events], tracking.band, period) for name in names}
+        self._watched = [_Watched(watched, events, period) for watched in tracking.watched]
         self._registered = [_Registered(metric, n) for metric in METRICS.values()]
         self._count = np.zeros(n, dtype=np.int64)  # samples of each episode so far
 
@@ -120,7 +125,8 @@ class Metrics:
 
         Args:
             start: which sample the first one is; the first of an episode is 0.
-            fields: observations by name, (samples, n, size).
+            fields: observations by name, (samples, n, size), and told entries of `info` where any is watched
+                (samples, n).
             diagnostics: of the policy at these samples, (samples, n, ...), or at some of them if no error is taken from
                 there; None where the policy had nothing to decide any more.
             live: (n,), the episodes whose samples these are; None for all.
@@ -157,6 +163,8 @@ class Metrics:
         for column, name in tracking.means.items():
             if diagnostics is not None and name in diagnostics:
                 self._means[column].add(diagnostics[name], live)
+        for watched in self._watched:
+            watched.add(fields, start, live)
         for registered in self._registered:
             registered.add(fields, diagnostics or {}, live)
 
@@ -207,6 +215,8 @@ class Metrics:
             columns["cost_of_transport"] = energy / (GRAVITY * carried)
         columns |= {column: squares.rms_of_all for column, squares in self._sigmas.items()}
         columns |= {column: mean.value for column, mean in self._means.items()}
+        for watched in self._watched:
+            columns |= watched.columns(self._count, fell)
         for registered in self._registered:
             if registered.name in columns:
                 raise OptionError("name of a metric", registered.name, "a name that no other column has")
@@ -249,19 +259,54 @@ class _Squares:
 
 
 class _Mean:
-    """Means of numbers in n episodes."""
+    """Means of numbers in n episodes; a NaN is no number."""
 
     def __init__(self, n: int) -> None:
         self._sums, self._number = np.zeros(n), np.zeros(n, dtype=np.int64)
 
     def add(self, values: Array, live: Mask | None) -> None:
         """Take in (samples, n)."""
-        self._sums = _added(self._sums, values, live)
-        self._number += len(values) if live is None else len(values) * live
+        known = ~np.isnan(values)
+        self._sums = _added(self._sums, np.where(known, values, 0.0), live)
+        self._number += known.sum(axis=0) if live is None else known.sum(axis=0) * live
 
     @property
     def value(self) -> Array:
         return self._sums / _or_nan(self._number)
+
+
+class _Watched:
+    """What is watched in n episodes, and how pushes disturb it."""
+
+    def __init__(self, watched: Watched, events: Sequence[Mapping[str, Span]], period: float) -> None:
+        self._watched = watched
+        self._mean, self._largest = _Mean(len(events)), np.full(len(events), np.nan)
+        names = dict.fromkeys(name for one in events for name in one if name.startswith(PUSH))
+        never = (np.inf, np.inf)
+        self._events = {
+            name: _Event([one.get(name, never) for one in events], watched.band, period, widens=False) for name in names
+        }
+
+    def add(self, fields: Fields, start: int, live: Mask | None) -> None:
+        """Take in a block of samples, of which the first is sample `start`."""
+        size = self._watched.size(fields)
+        self._mean.add(np.square(size), live)
+        self._largest = np.fmax(self._largest, _largest(size, live))
+        for event in self._events.values():
+            event.add(size, start, live)
+
+    def columns(self, count: NDArray[np.int64], fell: Mask) -> dict[str, Array]:
+        """Columns of episodes of so many samples, some of which ended in a fall."""
+        name, unit, scale = self._watched.name, self._watched.unit, self._watched.scale
+        columns: dict[str, Array] = {
+            f"rms_{name}_{unit}": scale * np.sqrt(self._mean.value),
+            f"max_{name}_{unit}": scale * self._largest,
+        }
+        for event, found in self._events.items():
+            columns[f"peak_{name}_{unit}_{event}"] = scale * found.peak
+            if np.isfinite(self._watched.band):
+                columns[f"recovery_time_s_{event}_{name}"] = found.recovery_time(count, fell)
+        return columns
 
 
 class _Registered:
@@ -317,10 +362,10 @@ class _Variation:
 class _Event:
     """What follows a disturbance in n episodes: the peak, and the recovery."""
 
-    def __init__(self, spans: Sequence[Span], band: float, period: float) -> None:
+    def __init__(self, spans: Sequence[Span], band: float, period: float, *, widens: bool = True) -> None:
         self._begin, self._end = np.array([[_sample(time, period) for time in span] for span in spans]).T
         self._before, self._after, self._hold = (_sample(time, period) for time in (BEFORE, AFTER, HOLD))
-        self._period = period
+        self._period, self._widens = period, widens
         self._band = np.full(len(spans), band)
         self._outside = self._end - 1  # the last sample outside the band, from the end of the disturbance on
         self._recovered = np.full(len(spans), -1)  # the sample from which on it held, once it has
@@ -332,12 +377,12 @@ class _Event:
         if k[-1, 0] < self._begin.min() - self._before:
             return
         counts = True if live is None else live
-        before = (k >= self._begin - self._before) & (k <= self._begin) & counts
-        self._band = np.maximum(self._band, np.where(before, size, 0.0).max(axis=0))
+        before = (k >= self._begin - self._before) & (k <= self._begin) & counts & self._widens
+        self._band = np.fmax(self._band, np.where(before, size, 0.0).max(axis=0))
         near = (k >= self._begin) & (k <= self._end + self._after) & counts
         self.peak = np.fmax(self.peak, np.fmax.reduce(np.where(near, size, np.nan), axis=0))
         since = (k >= self._end) & counts
-        outside = np.maximum.accumulate(np.where(since & (size > self._band), k, self._outside), axis=0)
+        outside = np.maximum.accumulate(np.where(since & ~(size <= self._band), k, self._outside), axis=0)
         held = since & (k - outside >= self._hold)
         here = held.any(axis=0) & (self._recovered < 0)
         recovered = np.take_along_axis(outside, held.argmax(axis=0)[None], axis=0)[0] + 1

@@ -61,6 +61,7 @@ def run_episode(
     observation, info = env.reset(seed=seed, options=options)
     disturbances = plant.sampled_disturbances
     observations, diagnostics, told = [np.array(observation)], [], [_told(plant, info)]  # copies: policies write
+    tells = told_every(plant, stride)
     state, episode_start = None, True
     terminated = truncated = False
     total = 0.0
@@ -73,27 +74,34 @@ def run_episode(
         observation, reward, terminated, truncated, info = env.step(action)
         total += float(reward)
         observations.append(np.array(observation))
-        if count % stride == 0:
+        if count % tells == 0:
             told.append(_told(plant, info))
         if on_progress is not None and count % report_every == 0:
             on_progress(info["time_s"])
 
     fields = plant.observation_layout.split(np.array(observations))
     inside = stack(diagnostics)
+    known = stack(told)
     metrics = metrics_for(plant, [disturbances], phases)
     last = len(observations) - 1
-    metrics.add(0, _part(fields, np.s_[:last, None]), _part(inside, np.s_[:, None]))
-    metrics.add(last, _part(fields, np.s_[last:, None]), None)  # nothing was decided there any more
+    measured = fields | (known if tells == 1 else {})
+    metrics.add(0, _part(measured, np.s_[:last, None]), _part(inside, np.s_[:, None]))
+    metrics.add(last, _part(measured, np.s_[last:, None]), None)  # nothing was decided there any more
     reason = fall_reason(info) if terminated else None
     row = row_of(reason, info["time_s"], total, metrics.rows(np.array([bool(terminated)]))[0], disturbances)
     kept = slice(None, None, stride // looks)
-    seen = _part(fields, slice(None, None, stride)) | stack(told)
+    seen = _part(fields, slice(None, None, stride)) | _part(known, slice(None, None, stride // tells))
     return Episode(row, traces_of(stride * period, seen, _part(inside, kept)))
 
 
 def diagnosed_every(plant: Any, stride: int) -> int:
     """How many control periods lie between two looks at a policy's inside, for metrics and for traces of a stride."""
     return 1 if plant.tracking.diagnosed else stride
+
+
+def told_every(plant: Any, stride: int) -> int:
+    """How many control periods lie between two looks at `info`, likewise."""
+    return 1 if plant.tracking.watched else stride
 
 
 def metrics_for(plant: Any, disturbances: Sequence[Mapping[str, Any]], phases: Sequence[Span]) -> Metrics:

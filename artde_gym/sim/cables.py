@@ -63,6 +63,12 @@ class Cables:
         """Vectors from the hooks to the loads (3, n) (m), world axes, and their rates (m/s)."""
         return self.position - self._hooks(bodies), self.velocity - self._hook_velocities(bodies)
 
+    def load_error(self, reference: Array) -> Array:
+        """From where the loads are to where they would hang at rest under vehicles at `reference` (3, n) (m)."""
+        error = reference + self._hook - self.position
+        error[2] -= self.length
+        return np.where(self.held, error, 0.0)
+
     def drift(self, duration: float) -> None:
         """Move along the velocities for `duration` (s)."""
         self.position += duration * self.velocity

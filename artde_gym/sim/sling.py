@@ -6,6 +6,7 @@ acts on the base as any outer force does. So every engine has the same cable, an
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -18,12 +19,13 @@ from artde_gym.errors import RobotError
 from artde_gym.kit import PAYLOAD
 from artde_gym.multibody.dynamics import GRAVITY
 from artde_gym.multibody.spec import Vector
-from artde_gym.sim.cable import FLOATS, Body, Load, cross, drag, minus, plus, pull, scaled, times, transposed_times
+from artde_gym.sim.cable import FLOATS, Body, Load, cross, dot, drag, minus, plus, pull, scaled, times, transposed_times
 from artde_gym.sim.camera import Camera
 from artde_gym.sim.engine import Engine, State
 from artde_gym.sim.rotation import matrix, moved
 
 NOTHING: Vector = (0.0, 0.0, 0.0)
+CURVE = 16  # pieces of a cable in pictures
 
 
 class _Hanging(NamedTuple):
@@ -151,6 +153,24 @@ class Sling:
     def length(self) -> float:
         """Length of the cable (m); 0 while nothing hangs."""
         return self._hanging.length if self._hanging is not None and self.held else 0.0
+
+    def curve(self) -> list[Vector]:
+        """Points of the cable from the hook to the load (m), a parabola where it is slack; none while nothing hangs."""
+        if not self.held:
+            return []
+        (x, y, z), _ = self.hook(self._engine.read())
+        r = minus(self._position, (x, y, z))
+        free = max(self.length - math.sqrt(dot(r, r)), 0.0)
+        sag = math.sqrt(0.375 * free * self.length)  # of a shallow parabola that is so much longer than its chord
+        along = [i / CURVE for i in range(CURVE + 1)]
+        return [(x + s * r[0], y + s * r[1], z + s * r[2] - 4.0 * sag * s * (1.0 - s)) for s in along]
+
+    def load_error(self, reference: Vector) -> Vector:
+        """From where the load is to where it would hang at rest under a vehicle at `reference` (m)."""
+        if self._hanging is None or not self.held:
+            return NOTHING
+        hook = plus(self._hanging.hook, self._engine.spec.base.com)
+        return minus(plus(reference, minus(hook, (0.0, 0.0, self._hanging.length))), self._position)
 
     def render(self, camera: Camera) -> NDArray[np.uint8]:
         if self._hanging is None:

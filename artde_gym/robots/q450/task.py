@@ -110,7 +110,12 @@ TRACKING = Tracking(
 )
 """Position and attitude, as in table 3.1 of the thesis; an error of 2 cm counts as recovered."""
 
-DOCUMENTATION = f"""\
+
+def documentation(
+    observation: Layout, *, reference: str, terms: str, perfect: float, end: str, disturbances: str
+) -> str:
+    """Write what the pages of an environment and of its vector share; their own arguments follow."""
+    return f"""\
 ## Action
 `wrench`, four numbers: thrust u1 (N) along the body's z axis, and torques u2, u3, u4 (Nm) about its x, y and z axes:
 
@@ -121,14 +126,13 @@ four rotors, each of which is limited to 0 to {robot.MAX_THRUST:g} N and follows
 {robot.ROTOR_LAG:g} s. Use Gymnasium's `RescaleAction` for [-1, 1].
 
 ## Observation
-{OBSERVATION.table()}
+{observation.table()}
 
 `wrench_applied` is what really acted, after limits, lag and losses of rotors, but without the gain of thrust near the
 ground: the time-delay estimate needs just that. What policies do not see: payload, wind, pushes, ground effect.
 
 ## Reference
-The infinity-shaped path of `artde_gym.robots.q450.infinity`: loop 1 until 33 s, rest until 37 s, loop 2 until 70 s;
-yaw 0.
+{reference}
 
 ## Reward
 Over a control period L, L times the sum of scale x term; each term is in `info`, as `reward_alive` and so on:
@@ -140,9 +144,9 @@ Over a control period L, L times the sum of scale x term; each term is in `info`
 | `velocity` | 0.5 | exp(-\\|e\\|^2 / 0.05), e = velocity_ref - velocity in m/s |
 | `upright` | 0.5 | cosine of the tilt |
 | `effort` | -0.05 | mean of (rotor thrust / 8.5 N)^2 |
-| `smoothness` | -0.05 | mean of (change of rotor thrust / 8.5 N)^2 |
+| `smoothness` | -0.05 | mean of (change of rotor thrust / 8.5 N)^2 |{terms}
 
-A flight of 70 s without an error earns a little under 280.
+A flight of 70 s without an error earns a little under {perfect:g}.
 
 ## Start
 At rest and level at the path's start, in balance with the payload and on thrusts that have settled.
@@ -150,7 +154,7 @@ At rest and level at the path's start, in balance with the payload and on thrust
 ## End
 *Terminated* by a crash, with the reason in `info`: `fell_ground` (the vehicle's origin lower
 than {GROUND_HEIGHT:g} m), `fell_inverted` (tilt above 90 degrees) or `fell_bounds` (x or y beyond {VOLUME:g} m, z above
-{VOLUME:g} m, or turning faster than {TUMBLING:g} rad/s). *Truncated* after `duration`.
+{VOLUME:g} m, or turning faster than {TUMBLING:g} rad/s).{end} *Truncated* after `duration`.
 
 ## Physics
 Vehicle of {robot.MASS:g} kg with linear drag of {robot.DRAG:g} N s/m against the air; see `artde_gym.robots.q450`. Wind
@@ -160,12 +164,23 @@ along the body's axes until the next time.
 ## Arguments
 | name | default | allowed | meaning |
 |---|---|---|---|
-| `disturbances` | payload of 0.35 kg until 35 s, wind, ground effect | see `artde_gym.disturbances` | what happens \
+| `disturbances` | {disturbances} | see `artde_gym.disturbances` | what happens \
 besides; `{{}}` for nothing |
 | `control_period` | 0.015 | whole multiples of {GRID:g} s up to 0.05 | time between two actions, L |
 | `measurement` | "ideal" | "ideal", "mocap" | the state itself, or what `artde_gym.disturbances.mocap` sees of it |
 | `duration` | 70.0 | 0.1 to 7200 s | length of the flight |"""
-"""What the pages of both environments share; their own arguments follow."""
+
+
+DOCUMENTATION = documentation(
+    OBSERVATION,
+    reference="""\
+The infinity-shaped path of `artde_gym.robots.q450.infinity`: loop 1 until 33 s, rest until 37 s, loop 2 until 70 s;
+yaw 0.""",
+    terms="",
+    perfect=280,
+    end="",
+    disturbances="payload of 0.35 kg until 35 s, wind, ground effect",
+)
 
 REWARD_SCALES: dict[str, float] = {
     "alive": 1.0,
@@ -219,21 +234,23 @@ def parse(disturbances: Mapping[str, Any]) -> Disturbances:
     return Disturbances.parse(disturbances, WORDS["site"], WORDS["joint"], robot.q450().name)
 
 
-def plan(duration: float, period: float) -> Array:
-    """What the observation takes from the path, one row a control period: (samples, 15)."""
+def plan(duration: float, period: float, lift: float = 0.0) -> Array:
+    """What the observation takes from the path, raised by `lift` (m), one row a control period: (samples, 15)."""
     path = infinity_path(duration, period)
     phase = path.period * np.arange(len(path.yaw)) / duration
     columns = (path.yaw, path.yaw_rate, phase)
-    return np.column_stack([path.position, path.velocity, path.acceleration, path.jerk, *columns])
+    return np.column_stack(
+        [np.add(path.position, (0.0, 0.0, lift)), path.velocity, path.acceleration, path.jerk, *columns]
+    )
 
 
-def start(realised: Mapping[str, Any]) -> Vector:
-    """Where the vehicle is at the start (m)."""
+def start(realised: Mapping[str, Any], lift: float = 0.0) -> Vector:
+    """Where the vehicle is at the start (m), of a path that is raised by `lift`."""
     x, y, z = map(operator.add, START, realised.get("initial_position", {}).get("offset", (0.0, 0.0, 0.0)))
-    return x, y, z
+    return x, y, z + lift
 
 
-def hover_thrusts(realised: Mapping[str, Any]) -> list[float]:
+def hover_thrusts(realised: Mapping[str, Any], lift: float = 0.0) -> list[float]:
     """Rotor thrusts (N) that balance the level vehicle at the start, with whatever it carries, as far as they can."""
     mass = robot.MASS * realised.get("mass_error", {}).get("factor", 1.0)
     payload = realised.get("payload")
@@ -244,7 +261,7 @@ def hover_thrusts(realised: Mapping[str, Any]) -> list[float]:
         moment_x, moment_y = payload["mass"] * GRAVITY * y, -payload["mass"] * GRAVITY * x
     gain = 1.0
     if "ground_effect" in realised:
-        gain = thrust_gain(start(realised)[2], robot.ROTOR_RADIUS, realised["ground_effect"]["strength"], max)
+        gain = thrust_gain(start(realised, lift)[2], robot.ROTOR_RADIUS, realised["ground_effect"]["strength"], max)
     balance = robot.thrusts(mass * GRAVITY, moment_x, moment_y, 0.0)
     return [min(max(thrust / gain, 0.0), robot.MAX_THRUST) for thrust in balance]
 

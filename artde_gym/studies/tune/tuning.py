@@ -1,11 +1,11 @@
 """Tuning: the same budget of trials for every controller, on training seeds; judged on seeds that nobody has seen.
 
 A trial is one set of gains, flown or walked in the same seeded episodes by all controllers. Its cost is the mean over
-the episodes of the tracking error that the environment reports first (`rmse_m`, `rmse_deg`), where a fall after t
-seconds counts `FALL` (1 + 1 / (1 + t)), more than any error. Trial 0 is the controller's own preset; the others are
-proposed by Optuna's tree-structured Parzen estimator (Bergstra et al. 2011) within the ranges that the controller was
-registered with. The gains of the smallest cost are then compared with the preset on held-out seeds: what was gained on
-the training seeds alone is gone there.
+the episodes of the tracking error that the environment reports first (`rmse_m`, `rmse_deg`), or of another column of
+the table of episodes, where a fall after t seconds counts `FALL` (1 + 1 / (1 + t)), more than any error. Trial 0 is the
+controller's own preset; the others are proposed by Optuna's tree-structured Parzen estimator (Bergstra et al. 2011)
+within the ranges that the controller was registered with. The gains of the smallest cost are then compared with the
+preset on held-out seeds: what was gained on the training seeds alone is gone there.
 
 A proposal depends on the seed, the controller and its finished trials, and on nothing else: results are the same on any
 number of processes, and for a run that was interrupted and continued.
@@ -82,6 +82,7 @@ def tune(
     episodes: int = 4,
     held_out: int = 20,
     seed: int = 0,
+    metric: str | None = None,
     workers: int = 1,
     out: str | Path | None = None,
     disturbances: Mapping[str, Any] | None = None,
@@ -99,6 +100,7 @@ def tune(
         trials: of each controller, the preset included.
         episodes: of each trial.
         held_out: episodes of the comparison.
+        metric: column of `episodes.csv` that is to be small; None for the environment's first error.
         seed: of the proposals and of the training episodes; the comparison's episodes are those of seed + 1.
         out: folder to store everything in; the same call continues an interrupted one.
         on_progress: called with what runs ("trial 3 of 50", "held-out") and the progress of its episodes.
@@ -123,7 +125,7 @@ def tune(
         allow_mixed=allow_mixed,
     )
     env_id = plan.cells[0].env_id
-    search = _Search(plan, on_progress)
+    search = _Search(plan, metric, on_progress)
     configuration = {
         "env": env_id,
         "scenario": scenario,
@@ -135,6 +137,7 @@ def tune(
         "episodes": episodes,
         "held_out": held_out,
         "seed": seed,
+        **({} if metric is None else {"metric": metric}),
     }
     store = None if out is None else TuningStore(Path(out), configuration, _behind(names, env_id), allow_mixed)
     return search.run(trials, held_out, store)
@@ -160,11 +163,11 @@ def _one_scenario(scenario: Any) -> str | None:
 class _Search:
     """The trials of all controllers, and the comparison in the end."""
 
-    def __init__(self, plan: Plan, on_progress: Callable[[str, Update], None] | None) -> None:
+    def __init__(self, plan: Plan, metric: str | None, on_progress: Callable[[str, Update], None] | None) -> None:
         env_id = plan.cells[0].env_id
         self._plan, self._on_progress = plan, on_progress
         self._proposer = Proposer(plan.seed)
-        self.metric = f"rmse_{tracking_of(env_id).errors[0].unit}"
+        self.metric = f"rmse_{tracking_of(env_id).errors[0].unit}" if metric is None else metric
         self.spaces = {name: search_space(name, single(env_id, json.dumps({}))) for name in plan.controllers}
 
     def run(self, trials: int, held_out: int, store: TuningStore | None) -> Tuning:

@@ -1,0 +1,101 @@
+"""The quadrotor's policies that look at the cable of a load."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from artde_gym.errors import OptionError
+from controllers.law_table import Entry
+from controllers.laws.cascade import CascadeGains, Flight, cascade
+from controllers.laws.load import LoadGains, load_control, load_start
+from controllers.laws.swing import Cable, swing_term
+from controllers.laws.tracking import Array, Law, Memory, Signals
+from controllers.policies import Plant
+from controllers.presets import preset_gains
+from controllers.quadrotor import AXES, LOOP_LAWS, QuadrotorPolicy, make_quadrotor
+
+SWING = "+swing"
+"""What follows a law's name where the swing term is added."""
+
+
+class SlungPolicy(QuadrotorPolicy):
+    """A cascade that observes a cable.
+
+    Raises:
+        OptionError: for an environment that has none.
+    """
+
+    def __init__(self, name: str, plant: Plant, gains: CascadeGains, *, laws: tuple[Entry, Entry]) -> None:
+        if "cable" not in plant.observation.slices:
+            raise OptionError(f"observation of the environment of {name!r}", list(plant.observation.slices),
+                              "with a cable, as that of QuadSling-Payload-v0")  # fmt: skip
+        super().__init__(name, plant, gains, laws=laws)
+
+    def cable(self, observation: Array) -> Cable:
+        """The cable in an observation."""
+        vector, rate, held = (observation[..., self._at[name]] for name in ("cable", "cable_rate", "cable_held"))
+        return Cable(vector, rate, held[..., 0] > 0.5)
+
+
+class SwingPolicy(SlungPolicy):
+    """Any law of the position with the swing term; where nothing hangs, the law alone."""
+
+    def read(self, observation: Array) -> Flight:
+        flight, own = super().read(observation), self.gains.position
+        du = swing_term(own.k_p, own.k_d, self.cable(observation), flight.acceleration_ref, flight.jerk_ref)
+        return self.accelerated(flight, du)
+
+
+class LoadPolicy(SlungPolicy):
+    """Geometric control of the load; where nothing hangs, of the vehicle."""
+
+    def step(self, memory: Any, signals: Flight, observation: Array) -> tuple[Array, Memory]:
+        cable = self.cable(observation)
+
+        def position(gains: LoadGains, own: Any, tracked: Signals, period: float) -> tuple[Array, Memory]:
+            return load_control(gains, own, tracked, cable, period)
+
+        law = Law(self._position.start, position)
+        return cascade(law, self._attitude, self.gains, memory, signals, self._period)
+
+
+def _load_start(gains: LoadGains, signals: Signals, _period: float) -> Memory:
+    return load_start(gains, signals)
+
+
+def _no_load(gains: LoadGains, memory: Any, signals: Signals, period: float) -> tuple[Array, Memory]:
+    """The law where nothing hangs."""
+    still = np.zeros_like(signals.q)
+    return load_control(gains, memory, signals, Cable(still, still, np.zeros(still.shape[:-1], np.bool_)), period)
+
+
+def _same(gains: LoadGains, _period: float) -> LoadGains:
+    return gains
+
+
+LOAD_LAW = Entry(Law(_load_start, _no_load), _same)
+
+
+def make_quadrotor_or_slung(env: Any, *, law: str, preset: str | None = None, **gains: Any) -> QuadrotorPolicy:
+    """Build the policy of a law for a quadrotor's environment, with or without a cable.
+
+    Args:
+        env: the environment that it will drive.
+        law: name of the law: one of `controllers.quadrotor.LOOP_LAWS`, that with "+swing", or "geometric-load".
+        preset: name of its gains; None for the law's default.
+        gains: in place of the preset's, as for `controllers.quadrotor.make_quadrotor`.
+
+    Raises:
+        UnknownNameError: for a law that the quadrotor does not have, or an unknown preset.
+        GainError: for an unknown gain or a value that is not allowed.
+        OptionError: for a law that needs a cable, in an environment without one.
+    """
+    if law in LOOP_LAWS:
+        return make_quadrotor(env, law=law, preset=preset, **gains)
+    plant = Plant.of(env)
+    own = preset_gains(plant.robot, law, preset, AXES, gains)
+    if law.endswith(SWING):
+        return SwingPolicy(law, plant, own, laws=LOOP_LAWS[law.removesuffix(SWING)])
+    return LoadPolicy(law, plant, own, laws=(LOAD_LAW, LOOP_LAWS["geometric"][1]))
