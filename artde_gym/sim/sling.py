@@ -25,7 +25,7 @@ from artde_gym.sim.engine import Engine, State
 from artde_gym.sim.rotation import matrix, moved
 
 NOTHING: Vector = (0.0, 0.0, 0.0)
-CURVE = 16  # pieces of a cable in pictures
+CURVE = 48  # pieces of a cable in pictures
 
 
 class _Hanging(NamedTuple):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import tracemalloc
 from typing import Any
 
 import gymnasium as gym
@@ -367,3 +368,48 @@ def test_a_biped_has_no_cable() -> None:
 def test_a_cable_begins_at_a_hook_of_its_own(given: dict[str, Any], position: list[float]) -> None:
     ((_, entry),) = parse({"payload": {"mass": 0.3, **given}}).entries
     assert list(entry["position"]) == position
+
+
+WILD: dict[str, Any] = {
+    "payload": {
+        "mass": {"uniform": [0.001, 5.0]},
+        "cable": {"uniform": [0.0, 2.0]},
+        "position": [{"uniform": [-0.5, 0.5]}] * 3,
+        "attach": {"uniform": [0.0, 0.6]},
+        "drop": {"uniform": [0.0, 1.2]},
+    },
+    "push": [
+        {
+            "body": "payload",
+            "magnitude": {"uniform": [0.0, 500.0]},
+            "direction": [{"normal": [0.0, 1.0]}] * 3,
+            "start": {"uniform": [0.0, 1.0]},
+            "duration": {"uniform": [0.001, 0.5]},
+        },
+        {"body": "front_left", "magnitude": {"uniform": [0.0, 50.0]}, "start": {"uniform": [0.0, 1.0]}},
+    ],
+    "wind": {"scale": {"uniform": [0.0, 10.0]}},
+    "mass_error": {"uniform": [0.5, 2.0]},
+}
+
+
+@pytest.mark.parametrize("count", [500, pytest.param(10_000, marks=pytest.mark.slow)])
+def test_wild_flights_end_without_nan_or_growth(count: int) -> None:
+    """Loads of a gram to 5 kg, cables of no length to 2 m, pushes of 500 N: every number stays finite."""
+    n, sizes = 250, []
+    env: Any = gym.make_vec(
+        "QuadSling-Payload-v0", n, "vector_entry_point", engine="numpy", disturbances=WILD, duration=1.2
+    )
+    observations, info = env.reset(seed=0)
+    ended, action = 0, np.tile([18.0, 0.0, 0.0, 0.0], (n, 1))
+    tracemalloc.start()
+    while ended < count:
+        observations, rewards, terminated, truncated, info = env.step(action)
+        ended += int((terminated | truncated).sum())
+        assert np.isfinite(observations).all()
+        assert np.isfinite(rewards).all()
+        assert all(np.isfinite(info[name]).all() for name in ("load_error", "swing", "cable_impulse"))
+        sizes.append(tracemalloc.get_traced_memory()[0])
+    tracemalloc.stop()
+    half = len(sizes) // 2
+    assert max(sizes[half:]) < 1.5 * max(sizes[:half]) + 1e6

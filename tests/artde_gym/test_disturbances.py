@@ -340,7 +340,7 @@ def test_each_robot_has_its_kinds_and_defaults():
     assert {"friction", "slope", "grf_pulse", "encoder_bits", "initial_pose"} <= {
         kind.name for kind in KINDS.values() if kind.honored_by("ojas") and not kind.honored_by("q450")
     }
-    assert {"wind", "ground_effect", "initial_position"} == {
+    assert {"wind", "ground_effect", "initial_position", "cable_delay"} == {
         kind.name for kind in KINDS.values() if kind.honored_by("q450") and not kind.honored_by("ojas")
     }
     push = {"magnitude": 1, "start": 0}
