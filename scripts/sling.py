@@ -95,37 +95,46 @@ def main() -> None:
     options = parser.parse_args()
     (masses, cables), more = FIGURES[options.figure]
     cells = [(mass, cable) for mass in masses for cable in cables]
+    found = flights(options.laws, cells, options.seeds, options.seed, more)
     print("| law | flown | " + " | ".join(title for title, _, _ in COLUMNS.values()) + " | settled | settles s |")
     print("|---|" + "---|" * (len(COLUMNS) + 3))
-    for label in options.laws:
-        print(row(label, flights(label, cells, options.seeds, options.seed, more)), flush=True)
+    for number, label in enumerate(options.laws):
+        size = len(cells) * options.seeds
+        print(row(label, found.iloc[number * size : (number + 1) * size]))
 
 
-def flights(label: str, cells: Any, seeds: int, seed: int, more: Mapping[str, Any]) -> pd.DataFrame:
-    """One row a flight."""
-    env = Grid([({**scenario(mass, cable), **more}, seeds) for mass, cable in cells])
-    name, gains = LAWS[label]
-    policy: Any = controllers.make(name, env.unwrapped, **gains)
-    if name == "geometric-load":
-        policy = Told([controllers.make(name, env.unwrapped, load_mass_p=mass, **gains) for mass, _ in cells], seeds)
-    numbers = [episode_seed(seed, number) for number in range(seeds)] * len(cells)
-    return pd.DataFrame([episode.row for episode in run_batch(env, policy, numbers)])
+def flights(
+    labels: Sequence[str], cells: Sequence[tuple[float, float]], seeds: int, seed: int, more: Mapping[str, Any]
+) -> pd.DataFrame:
+    """One row a flight: law by law, mass and cable by mass and cable, all in one vector."""
+    env = Grid([({**scenario(mass, cable), **more}, seeds) for _ in labels for mass, cable in cells])
+    numbers = [episode_seed(seed, number) for number in range(seeds)] * (len(cells) * len(labels))
+    policies: list[tuple[Any, int]] = []
+    for label in labels:
+        name, gains = LAWS[label]
+        if name == "geometric-load":
+            policies += [(controllers.make(name, env.unwrapped, load_mass_p=mass, **gains), seeds) for mass, _ in cells]
+        else:
+            policies.append((controllers.make(name, env.unwrapped, **gains), seeds * len(cells)))
+    return pd.DataFrame([episode.row for episode in run_batch(env, Together(policies), numbers)])
 
 
-class Told:
-    """Policies that know the load's mass, each for its part of a vector."""
+class Together:
+    """Policies side by side, each for so many environments of a vector."""
 
-    def __init__(self, policies: Sequence[Any], count: int) -> None:
-        self._policies, self._count = policies, count
+    def __init__(self, policies: Sequence[tuple[Any, int]]) -> None:
+        stops = np.cumsum([count for _, count in policies]).tolist()
+        self._parts = [
+            (policy, slice(stop - count, stop)) for (policy, count), stop in zip(policies, stops, strict=True)
+        ]
 
     def predict(
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
-    ) -> Any:
-        parts = [slice(i * self._count, (i + 1) * self._count) for i in range(len(self._policies))]
-        states = [None] * len(parts) if state is None else state
+    ) -> tuple[Any, Any]:
+        states = [None] * len(self._parts) if state is None else state
         found = [
-            policy.predict(observation[part], own, None if state is None else episode_start[part])
-            for policy, part, own in zip(self._policies, parts, states, strict=True)
+            policy.predict(observation[part], own, None if own is None else episode_start[part])
+            for (policy, part), own in zip(self._parts, states, strict=True)
         ]
         return np.concatenate([action for action, _ in found]), [own for _, own in found]
 
