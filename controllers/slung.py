@@ -49,7 +49,7 @@ class SwingPolicy(SlungPolicy):
 
 
 class LoadPolicy(SlungPolicy):
-    """Geometric control of the load; where nothing hangs, of the vehicle."""
+    """Geometric control of the load above a time-delay attitude; where nothing hangs, PID of the position."""
 
     def step(self, memory: Any, signals: Flight, observation: Array) -> tuple[Array, Memory]:
         cable = self.cable(observation)
@@ -98,4 +98,4 @@ def make_quadrotor_or_slung(env: Any, *, law: str, preset: str | None = None, **
     own = preset_gains(plant.robot, law, preset, AXES, gains)
     if law.endswith(SWING):
         return SwingPolicy(law, plant, own, laws=LOOP_LAWS[law.removesuffix(SWING)])
-    return LoadPolicy(law, plant, own, laws=(LOAD_LAW, LOOP_LAWS["geometric"][1]))
+    return LoadPolicy(law, plant, own, laws=(LOAD_LAW, LOOP_LAWS["tde"][1]))

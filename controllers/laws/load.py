@@ -3,16 +3,21 @@
 With the load at x, the cable's direction q from vehicle to load, its length l, the masses m (vehicle) and m_L, and
 e = x_ref - x, the vehicle's force is
 
-    A   = xdd_ref + Kd ed + Kp e + i + g e_3,   i += L Ki e     the load's desired acceleration, against gravity
-    q_c = -A / |A|                                              where the cable ought to point
-    F   = ((m + m_L) A . q + m l |qd|^2) q + m l (w_q^2 q x (q x q_c) + 2 zeta w_q qd)
+    A   = xdd_ref + k_v ed + k_x e + i + g e_3,   i += L Ki e     the load's desired acceleration, against gravity
+    q_c = -A / |A|                                                where the cable ought to point
+    F   = ((m + m_L) A . q + m l |qd|^2) q + m l (k_q q x (q x q_c) + k_w qd)
 
 The first part pulls along the cable, the second one turns it. Derivatives of q_c, which hold the load's jerk, are
 taken for zero: from a filter they crash. A position law takes over where no load hangs. The load's reference is the
 vehicle's, one cable below.
 
+For small swings the four gains place four poles. For each length they are put where `controllers.laws.swing` has them
+at Kp, Kd with w^2 = g / l and its K1, K2:
+
+    k_q = Kp + w^2 + K1,   k_w = Kd + K2,   k_x = Kp w^2 / k_q,   k_v = Kd w^2 / k_q
+
 Source: K. Sreenath, T. Lee, V. Kumar, "Geometric control and differential flatness of a quadrotor UAV with a
-cable-suspended load", CDC 2013; the integral is ours.
+cable-suspended load", CDC 2013; the integral and the choice of poles are ours.
 """
 
 from __future__ import annotations
@@ -28,7 +33,7 @@ from controllers.laws.positional_pid import (
     positional_pid,
     positional_pid_start,
 )
-from controllers.laws.swing import GRAVITY, SHORTEST, Cable
+from controllers.laws.swing import GRAVITY, SHORTEST, Cable, stiffness, swing_gains
 from controllers.laws.tracking import Array, Signals, check_non_negative, check_positive_number, components
 from controllers.laws.vectors import Vector, cross, dot, joined, minus, plus, scaled
 
@@ -42,11 +47,9 @@ class LoadGains(PositionalPidGains):
     Attributes:
         load_mass: m_L (kg).
         vehicle_mass: m (kg).
-        load_k_p: stiffness of the load's error (1/s^2).
-        load_k_d: its damping (1/s).
-        load_k_i: its integral gain (1/s^3).
-        swing_rate: w_q (rad/s).
-        swing_damping: zeta.
+        load_k_p: Kp (1/s^2).
+        load_k_d: Kd (1/s).
+        load_k_i: Ki, integral gain of the load's error (1/s^3).
     """
 
     load_mass: float
@@ -54,12 +57,10 @@ class LoadGains(PositionalPidGains):
     load_k_p: float
     load_k_d: float
     load_k_i: float
-    swing_rate: float
-    swing_damping: float
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for field in ("load_mass", "vehicle_mass", "load_k_p", "load_k_d", "swing_rate", "swing_damping"):
+        for field in ("load_mass", "vehicle_mass", "load_k_p", "load_k_d"):
             check_positive_number(field, getattr(self, field))
         check_non_negative("load_k_i", self.load_k_i)
 
@@ -93,16 +94,18 @@ def load_control(
 
     e, ed, e_vector = _errors(signals, cable, length)
     integral = np.where(held, np.clip(memory.load_integral + (period * gains.load_k_i) * e_vector, -LIMIT, LIMIT), 0.0)
-    wanted = plus(components(signals.qdd_ref), plus(scaled(gains.load_k_p, e), scaled(gains.load_k_d, ed)))
+    square = stiffness(cable)
+    k_1, k_2 = swing_gains(gains.load_k_p, gains.load_k_d, square)
+    k_q, k_w = gains.load_k_p + square + k_1, gains.load_k_d + k_2
+    share = square / k_q
+    feedback = plus(scaled(gains.load_k_p * share, e), scaled(gains.load_k_d * share, ed))
+    wanted = plus(components(signals.qdd_ref), feedback)
     wanted = plus(wanted, components(integral))
     wanted = (wanted[0], wanted[1], wanted[2] + GRAVITY)
     aim = scaled(-1.0 / np.sqrt(np.maximum(dot(wanted, wanted), 1e-6)), wanted)
     inertia = gains.vehicle_mass * length
     along = (gains.vehicle_mass + gains.load_mass) * dot(wanted, q) + inertia * dot(turning, turning)
-    turned = plus(
-        scaled(gains.swing_rate**2, cross(q, cross(q, aim))),
-        scaled(2.0 * gains.swing_damping * gains.swing_rate, turning),
-    )
+    turned = plus(scaled(k_q, cross(q, cross(q, aim))), scaled(k_w, turning))
     force = joined(plus(scaled(along, q), scaled(inertia, turned)))
     return np.where(held, force, alone), LoadMemory(integral, alone_memory)
 

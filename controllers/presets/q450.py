@@ -150,22 +150,19 @@ Q450: dict[tuple[str, str], Preset] = {
         _cascade(
             LoadGains(
                 _MASS,
-                47.55,
-                10.53,
-                k_i=52.06,
+                10.0,
+                5.0,
+                k_i=5.0,
                 integral_limit=20.0,
                 load_mass=0.35,
                 vehicle_mass=_MASS,
-                load_k_p=4.9,
-                load_k_d=2.4,
+                load_k_p=_K_P,
+                load_k_d=_K_D,
                 load_k_i=0.5,
-                swing_rate=6.3,
-                swing_damping=0.55,
             ),
-            RigidAttitudeGains(375.8, 29.14, _INERTIA),
+            TdeGains(_J_BAR, _K_P, _K_D),
         ),
-        "ours, by hand: the load's poles are those of tde+swing with a cable of 0.5 m; position without a load and "
-        "attitude as of the tuned geometric control",
+        "ours, by hand: the load's poles are those of tde+swing; attitude as there, position without a load as of pid",
     ),
     ("indi", "hand"): Preset(
         _cascade(
@@ -216,13 +213,10 @@ Q450_RANGES: dict[str, Ranges] = {
     "atde+swing": {**_DELAYED, **_ROBUST, **_GROWTH},
     "artde+swing": {**_DELAYED, **_ROBUST, **_GROWTH, "gamma_1_p": (0.05, 50.0), "gamma_1_q": (0.05, 50.0)},
     "geometric-load": {
-        "load_k_p_p": (1.0, 30.0),
-        "load_k_d_p": (0.5, 15.0),
-        "load_k_i_p": (0.1, 20.0),
-        "swing_rate_p": (1.0, 20.0),
-        "swing_damping_p": (0.2, 3.0),
-        "k_p_q": _FEEDBACK["k_p_q"],
-        "k_d_q": _FEEDBACK["k_d_q"],
+        "load_k_p_p": _FEEDBACK["k_p_p"],
+        "load_k_d_p": _FEEDBACK["k_d_p"],
+        "load_k_i_p": (0.05, 6.0),
+        **{name: _DELAYED[name] for name in ("k_p_q", "k_d_q", "m_bar_q")},
     },
     "indi": {**_FEEDBACK, "m_bar_p": (0.5, 2.5), "filter_rate_p": (10.0, 200.0), "filter_rate_q": (10.0, 200.0)},
     "asmc": {

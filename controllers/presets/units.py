@@ -13,8 +13,6 @@ _UNITS = {
     "load_k_p": "1/s^2",
     "load_k_d": "1/s",
     "load_k_i": "1/s^3",
-    "swing_rate": "rad/s",
-    "swing_damping": "1",
     "k_s": "1/s",
     "integral_limit": "{length}/s^2",
     "alpha": "1",

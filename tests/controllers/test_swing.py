@@ -96,8 +96,8 @@ def test_a_law_for_a_cable_needs_one(name: str) -> None:
 
 def test_gains_are_checked_and_tuned() -> None:
     env = make(1)
-    with pytest.raises(GainError, match="swing_rate_p is 0"):
-        controllers.make("geometric-load", env, swing_rate_p=0.0)
+    with pytest.raises(GainError, match="load_k_d_p is 0"):
+        controllers.make("geometric-load", env, load_k_d_p=0.0)
     assert controllers.make("tde+swing", env, preset="slung").gains.position.m_bar == 1.6
     for name in SLUNG:
         for gain in search_space(name, env).values():
