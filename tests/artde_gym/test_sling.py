@@ -241,3 +241,27 @@ def test_scenarios_fly(name: str) -> None:
     assert json.loads(json.dumps(drawn))["push"][0]["body"] == "payload"
     speed = drawn["push"][0]["magnitude"] * drawn["push"][0]["duration"] / drawn["payload"]["mass"]
     assert speed == pytest.approx(0.8, rel=0.06)
+
+
+def test_engines_fly_as_the_vector_does_for_45_seconds(engine_name: EngineName) -> None:
+    """Kick and release included; under the swing term, which damps what would make them part."""
+    given = {
+        "payload": {"mass": 0.35, "cable": 0.5, "drop": 35.0},
+        "push": {"body": "payload", "magnitude": 1.4, "direction": [1, 1, 0], "start": 20.0},
+    }
+
+    def flown(env: Any) -> np.ndarray:
+        policy = controllers.make("tde+swing", env)
+        observation, _ = env.reset(seed=0)
+        state, seen = None, []
+        for _ in range(2999):
+            action, state = policy.predict(observation, state)
+            observation, *_ = env.step(action)
+            now = fields(np.ravel(observation))
+            seen.append(np.concatenate([now["position"], now["position"] + now["cable"]]))
+        return np.array(seen)
+
+    many = flown(vector(1, disturbances=given, duration=45.0))
+    alone = flown(single(engine=engine_name, disturbances=given, duration=45.0))
+    assert np.linalg.norm((alone - many)[:, :3], axis=1).max() < 1e-3
+    assert np.linalg.norm((alone - many)[:2300, 3:], axis=1).max() < 1e-3
