@@ -14,7 +14,7 @@ from typing import Any, Concatenate, Literal, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from artde_gym.errors import ActionError, ArtdeGymError, OptionError, UnknownArgumentError, among
+from artde_gym.errors import ActionError, ArtdeGymError, OptionError, UnknownArgumentError, suggest_names
 
 Owner = TypeVar("Owner")
 Arguments = ParamSpec("Arguments")
@@ -25,7 +25,7 @@ NAME_BYTES = 200
 """Of a name that is a part of a file's: file systems take 255, and a number, an ending and what is added come to it."""
 
 
-def number(field: str, value: Any, low: float, high: float, allowed: str) -> float:
+def check_number(field: str, value: Any, low: float, high: float, allowed: str) -> float:
     """The value as a float, if it is a number from `low` to `high`.
 
     Raises:
@@ -37,7 +37,7 @@ def number(field: str, value: Any, low: float, high: float, allowed: str) -> flo
     return float(value)
 
 
-def whole(field: str, value: Any, low: int, high: int | None = None) -> int:
+def check_integer(field: str, value: Any, low: int, high: int | None = None) -> int:
     """The value as an int, if it is a whole number from `low` to `high`; None for no upper end.
 
     Raises:
@@ -51,7 +51,7 @@ def whole(field: str, value: Any, low: int, high: int | None = None) -> int:
     return int(value)
 
 
-def word(field: str, value: object, known: Collection[str]) -> str:
+def check_choice(field: str, value: object, known: Collection[str]) -> str:
     """The value, if it is one of the known words.
 
     Raises:
@@ -62,7 +62,7 @@ def word(field: str, value: object, known: Collection[str]) -> str:
     return value
 
 
-def flag(field: str, value: object) -> bool:
+def check_bool(field: str, value: object) -> bool:
     """The value, if it is a truth value.
 
     Raises:
@@ -113,7 +113,7 @@ def real_array(
         raise ActionError(field, value, allowed) from error
 
 
-def seed_number(field: str, value: Any) -> int | None:
+def check_seed(field: str, value: Any) -> int | None:
     """The value as a seed, if it is a whole number >= 0 of any type, an array of no dimension included, or None.
 
     Raises:
@@ -138,13 +138,13 @@ def known_arguments(
     def checked(self: Owner, /, *args: Arguments.args, **kwargs: Arguments.kwargs) -> None:
         for name in kwargs:
             if name not in known:
-                raise UnknownArgumentError(type(self).__name__, name, among(name, known))
+                raise UnknownArgumentError(type(self).__name__, name, suggest_names(name, known))
         initialize(self, *args, **kwargs)
 
     return checked
 
 
-def file_name(field: str, value: object) -> str:
+def check_file_name(field: str, value: object) -> str:
     """The value, if it is a word that can name a file in a folder of ours, and nothing outside.
 
     Raises:
@@ -160,7 +160,7 @@ def file_name(field: str, value: object) -> str:
 
 
 @contextlib.contextmanager
-def reading(field: str, path: Path, allowed: str, kind: type[ArtdeGymError]) -> Iterator[None]:
+def wrap_read_errors(field: str, path: Path, allowed: str, kind: type[ArtdeGymError]) -> Iterator[None]:
     """What goes wrong inside, while a file is read that may be anybody's, becomes an error of the given kind.
 
     Everything, since damaged files make libraries raise almost anything: zlib.error, RecursionError, MemoryError, ...
@@ -180,7 +180,7 @@ def steps_per_period(control_period: float, step: float) -> int:
         OptionError: unless it is a whole number, and the period 0.05 s at most.
     """
     allowed = f"whole multiples of {step} s up to 0.05 s"
-    period = number("control_period", control_period, 0.0, 0.05 + 0.5 * step, allowed)
+    period = check_number("control_period", control_period, 0.0, 0.05 + 0.5 * step, allowed)
     steps = round(period / step)
     if not (1 <= steps <= round(0.05 / step) and math.isclose(steps * step, period, rel_tol=1e-9)):
         raise OptionError("control_period", control_period, allowed)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 Array: TypeAlias = NDArray[np.floating[Any]]
 
 
-def each(function: Callable[..., float]) -> Callable[..., Array]:
+def vectorize(function: Callable[..., float]) -> Callable[..., Array]:
     """A function of numbers as one of arrays (n,): for those of `math`, since NumPy's own round otherwise."""
 
     def mapped(*arrays: Array) -> Array:

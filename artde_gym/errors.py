@@ -68,7 +68,7 @@ class WorkerError(ArtdeGymError):
     """Worker processes that end before their work is done."""
 
 
-def among(name: object, known: Collection[str]) -> str:
+def suggest_names(name: object, known: Collection[str]) -> str:
     """The known names as a sentence, the likely meant one pointed out."""
     close = difflib.get_close_matches(str(name), known, n=1)
     hint = f" (did you mean {close[0]!r}?)" if close else ""

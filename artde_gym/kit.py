@@ -4,7 +4,7 @@ A robot is three objects, one for each package, found by three groups of entry p
 
     artde_gym.robots     `RobotKit`: its model, environments, disturbances, scenarios, and how it is shown
     artde_gym.drives     `controllers.drive.Drive`: which policies drive it, at which gains
-    artde_gym.couplings  `baselines.agent.Agent`: how a learned residual acts on it, and what it is trained on
+    artde_gym.agents  `baselines.agent.Agent`: how a learned residual acts on it, and what it is trained on
 
 Only the first one is needed; without the others, a robot has the joint-space laws without presets, and residuals on
 joint accelerations.

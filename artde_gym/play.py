@@ -157,7 +157,7 @@ class Session:
     def _show(self) -> None:
         """Each look at the window waits for it: words and the view change less often than the robot moves."""
         engine = self._plant.engine
-        self._window.show(engine.read(), engine.payload_position())
+        self._window.show(engine.state(), engine.payload_position())
         place = engine.site(self._sites[0])
         if math.dist(place, self._seen) > VIEW:
             self._window.follow(place)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import gymnasium as gym
 
-from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from artde_gym.kit import ROBOTS
 from artde_gym.registry import Registry
 
@@ -22,20 +22,20 @@ from artde_gym.registry import Registry
 class ControllerSpec:
     """A controller by name: `entry_point` is "module:function", called as function(env, **kwargs).
 
-    `search`, in the same form and called the same way, gives the gains that tuning may change; None if there are none.
+    `tuning_space`, in the same form and called the same way, gives the gains that tuning may change; None if there are none.
     """
 
     name: str
     entry_point: str
     kwargs: Mapping[str, Any]
     text: str
-    search: str | None = None
+    tuning_space: str | None = None
 
 
 class GainRange(NamedTuple):
-    """Where to look for a gain: from `start`, between `low` and `high`, on a logarithmic scale; all above zero."""
+    """Where to look for a gain: from `initial`, between `low` and `high`, on a logarithmic scale; all above zero."""
 
-    start: float
+    initial: float
     low: float
     high: float
 
@@ -52,7 +52,7 @@ REPLACEABLE = "preset"
 
 
 def register_controller(
-    name: str, entry_point: str, *, text: str = "", search: str | None = None, **kwargs: Any
+    name: str, entry_point: str, *, text: str = "", tuning_space: str | None = None, **kwargs: Any
 ) -> None:
     """Make `name` known to `controllers.make`, to `evaluate` and to the command line.
 
@@ -61,7 +61,7 @@ def register_controller(
         entry_point: "module:function"; the function is called as function(env, **kwargs, **overrides) and returns a
             policy with Stable-Baselines3's `predict`.
         text: one line for listings.
-        search: "module:function" for `artde-gym tune`; called as function(env, **kwargs), it returns a mapping from
+        tuning_space: "module:function" for `artde-gym tune`; called as function(env, **kwargs), it returns a mapping from
             gains to `GainRange`.
         kwargs: fixed arguments of the function, which no override replaces (but for a `preset`).
 
@@ -71,10 +71,10 @@ def register_controller(
     """
     if not (isinstance(name, str) and name):
         raise OptionError("name of a controller", name, "a word")
-    for field, point in (("entry_point", entry_point), ("search", search)):
+    for field, point in (("entry_point", entry_point), ("tuning_space", tuning_space)):
         if point is not None and not _is_entry_point(point):
             raise UnknownNameError(field, point, '"module:function"')
-    spec = ControllerSpec(name, entry_point, dict(kwargs), text, search)
+    spec = ControllerSpec(name, entry_point, dict(kwargs), text, tuning_space)
     if _brought.get(name, spec) != spec:
         raise OptionError("name of a controller", name, f"a new name; these are taken: {', '.join(sorted(_brought))}")
     register_spec(spec)
@@ -116,23 +116,23 @@ def make_controller(name: str, env: Any, /, **overrides: Any) -> Any:
     return policy
 
 
-def search_space(name: str, env: Any) -> dict[str, GainRange]:
+def tuning_space(name: str, env: Any) -> dict[str, GainRange]:
     """The gains of the controller called `name` that tuning may change, for the robot of an environment.
 
     Raises:
-        UnknownNameError: if no controller has this name, its gains have no ranges, or `search` cannot be imported.
+        UnknownNameError: if no controller has this name, its gains have no ranges, or `tuning_space` cannot be imported.
     """
     known = _known(name)
-    if known.search is None:
-        tunable = [other for other, spec in registered_controllers().items() if spec.search is not None]
-        raise UnknownNameError("controller to be tuned", name, among(name, tunable))
-    return dict(_imported(name, known.search)(env, **known.kwargs))
+    if known.tuning_space is None:
+        tunable = [other for other, spec in registered_controllers().items() if spec.tuning_space is not None]
+        raise UnknownNameError("controller to be tuned", name, suggest_names(name, tunable))
+    return dict(_imported(name, known.tuning_space)(env, **known.kwargs))
 
 
 def _known(name: str) -> ControllerSpec:
     known = registered_controllers()
     if name not in known:
-        raise UnknownNameError("controller", name, among(name, known))
+        raise UnknownNameError("controller", name, suggest_names(name, known))
     return known[name]
 
 

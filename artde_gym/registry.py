@@ -7,7 +7,7 @@ from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
-from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 
 T = TypeVar("T")
 
@@ -64,7 +64,7 @@ class Registry(Mapping[str, T], Generic[T]):
         """
         self._load()
         if not isinstance(name, str) or name not in self._entries:
-            raise UnknownNameError(self.noun, name, among(name, self._entries))
+            raise UnknownNameError(self.noun, name, suggest_names(name, self._entries))
         return self._entries[name]
 
     def __getitem__(self, name: str) -> T:

@@ -8,7 +8,7 @@ from typing import Any
 
 from artde_gym.layout import Layout
 from artde_gym.registry import Registry
-from baselines.coupling import Coupling
+from baselines.action_adapter import ActionAdapter
 from baselines.task import Task
 
 JOINTS = "joints"
@@ -20,11 +20,11 @@ class Agent:
 
     Attributes:
         robot: by the environments' `robot_name`.
-        coupling: called as coupling(plant, recipe, gains of the base); None for accelerations of the joints, see
-            `baselines.joint_coupling`.
-        channels: what an action may mean, each with its default limit of du (rad/s^2, m/s^2); the first one is the
+        adapter: called as adapter(interface, config, gains of the base); None for accelerations of the joints, see
+            `baselines.joint_adapter`.
+        action_modes: what an action may mean, each with its default limit of du (rad/s^2, m/s^2); the first one is the
             default.
-        hold: default time between two decisions (s); 0 for the control periods that come nearest to 20 ms.
+        decision_period: default time between two decisions (s); 0 for the control periods that come nearest to 20 ms.
         tasks: by environment; any other environment has the task of `baselines.tasks.own_task`.
         balanced: channels for which the linear balance law (`cma-es`) has gains.
         observation, action: layouts of its environments, by which saved policies are read without one; without them,
@@ -34,9 +34,9 @@ class Agent:
     """
 
     robot: str
-    coupling: Callable[[Any, Any, Any], Coupling] | None = None
-    channels: Mapping[str, float] = dataclasses.field(default_factory=lambda: {JOINTS: 25.0})
-    hold: float = 0.0
+    adapter: Callable[[Any, Any, Any], ActionAdapter] | None = None
+    action_modes: Mapping[str, float] = dataclasses.field(default_factory=lambda: {JOINTS: 25.0})
+    decision_period: float = 0.0
     tasks: dict[str, Task] = dataclasses.field(default_factory=dict)
     balanced: frozenset[str] = frozenset()
     observation: Layout | None = None
@@ -45,7 +45,7 @@ class Agent:
     nominal_name: Callable[[Mapping[str, Any]], str] | None = None
 
 
-AGENTS: Registry[Agent] = Registry("coupling", "artde_gym.couplings", lambda agent: {agent.robot: agent})
+AGENTS: Registry[Agent] = Registry("agent", "artde_gym.agents", lambda agent: {agent.robot: agent})
 """All of them by robot."""
 
 

@@ -15,7 +15,7 @@ from artde_gym.benchmark.figure import Figure, Section
 from artde_gym.benchmark.timing import Job, in_turns
 from baselines.agent import AGENTS
 from baselines.policy_file import DESCRIPTION, read
-from baselines.recipe import Recipe
+from baselines.residual_config import ResidualConfig
 from baselines.run import Run, Training
 from baselines.saved import SHIPPED, load
 from baselines.tasks import task as task_of
@@ -101,7 +101,7 @@ def _throughput(env_id: str, rollouts: int) -> list[Figure]:
 
     task = task_of(env_id)
     kwargs = {} if task.batch_engine is None else {"engine": task.batch_engine}
-    run_of = Training(env_id, Recipe(task.robot), env_kwargs=kwargs)
+    run_of = Training(env_id, ResidualConfig(task.robot), env_kwargs=kwargs)
     with tempfile.TemporaryDirectory() as folder:
         run = Run(run_of, Path(folder))
         env, residual = environments(run_of, run)

@@ -1,7 +1,7 @@
 """Checkpoints of a training: everything that the rest of it depends on, written at once, read without executing.
 
 A checkpoint is a folder whose number counts intervals. All random numbers of an interval come from the training's seed
-and that number, and every interval begins with fresh episodes: so parameters, optimiser and normaliser (for SAC also
+and that number, and every interval begins with fresh episodes: so parameters, optimiser and normalizer (for SAC also
 the replay buffer) are the whole state, and a training that was killed and continued equals one that was not.
 """
 
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from artde_gym.arguments import reading
+from artde_gym.arguments import wrap_read_errors
 from baselines.errors import TrainingError
 
 KEPT = 2
@@ -28,7 +28,7 @@ class Checkpoints:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
-    def save(self, model: Any, normaliser: Any, state: dict[str, Any]) -> None:
+    def save(self, model: Any, normalizer: Any, state: dict[str, Any]) -> None:
         """Write the state after interval `state["interval"]`; it appears whole or not at all."""
         self.folder.mkdir(parents=True, exist_ok=True)
         part = self.folder / "part"
@@ -38,7 +38,7 @@ class Checkpoints:
         if hasattr(model, "log_ent_coef"):
             parameters["log_ent_coef"] = model.log_ent_coef.detach()  # no parameter of SAC's policy
         torch.save(parameters, part / "parameters.pt")
-        statistics = {"observation": normaliser.obs_rms, "return": normaliser.ret_rms}
+        statistics = {"observation": normalizer.obs_rms, "return": normalizer.ret_rms}
         arrays = {f"{name}_{key}": getattr(values, key) for name, values in statistics.items() for key in _STATISTICS}
         np.savez(part / "normaliser.npz", **arrays)
         if hasattr(model, "replay_buffer"):
@@ -57,24 +57,24 @@ class Checkpoints:
         for old in self._numbered()[:-KEPT]:
             shutil.rmtree(old)
 
-    def restore(self, model: Any, normaliser: Any) -> dict[str, Any] | None:
-        """Put the newest checkpoint into a model and its normaliser; returns its state, or None without one."""
+    def restore(self, model: Any, normalizer: Any) -> dict[str, Any] | None:
+        """Put the newest checkpoint into a model and its normalizer; returns its state, or None without one."""
         numbered = self._numbered()
         if not numbered:
             return None
         folder = numbered[-1]
         allowed = "a folder that `train` wrote; without it, the one before is used"
-        with reading("checkpoint", folder, allowed, TrainingError):
-            return self._restore(folder, model, normaliser)
+        with wrap_read_errors("checkpoint", folder, allowed, TrainingError):
+            return self._restore(folder, model, normalizer)
 
-    def _restore(self, folder: Path, model: Any, normaliser: Any) -> dict[str, Any]:
+    def _restore(self, folder: Path, model: Any, normalizer: Any) -> dict[str, Any]:
         parameters = torch.load(folder / "parameters.pt", weights_only=True)
         if "log_ent_coef" in parameters:
             model.log_ent_coef.data.copy_(parameters.pop("log_ent_coef"))
         model.set_parameters(parameters, device="cpu")
         # NumPy leaves a damaged file open, if it was given its path
         with (folder / "normaliser.npz").open("rb") as file, np.load(file, allow_pickle=False) as arrays:
-            for name, values in {"observation": normaliser.obs_rms, "return": normaliser.ret_rms}.items():
+            for name, values in {"observation": normalizer.obs_rms, "return": normalizer.ret_rms}.items():
                 for key in _STATISTICS:
                     stored = arrays[f"{name}_{key}"]
                     setattr(values, key, stored if stored.ndim else stored.item())

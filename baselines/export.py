@@ -10,8 +10,8 @@ from torch import nn
 from baselines.network import Network
 
 
-def exported(model: Any, normaliser: Any) -> Network:
-    """The deterministic actor of a PPO or SAC model with its normaliser."""
+def exported(model: Any, normalizer: Any) -> Network:
+    """The deterministic actor of a PPO or SAC model with its normalizer."""
     policy = model.policy
     squashed = hasattr(policy, "actor")
     modules = [*policy.actor.latent_pi, policy.actor.mu] if squashed else []
@@ -25,5 +25,5 @@ def exported(model: Any, normaliser: Any) -> Network:
         for module in modules
         if isinstance(module, nn.Linear)
     )
-    statistics = normaliser.obs_rms
+    statistics = normalizer.obs_rms
     return Network(statistics.mean.astype(np.float32), statistics.var.astype(np.float32), layers, squashed)

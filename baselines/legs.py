@@ -71,7 +71,7 @@ def ankle(leg: Array) -> Array:
     return np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=-1)
 
 
-def moved(ankles: Array, offsets: Array) -> Array:
+def joint_offsets(ankles: Array, offsets: Array) -> Array:
     """Change of joints (..., 2, 6) when `ankles` (..., 2, 3), under level feet, move by `offsets`, within reach.
 
     Zero, exactly, where the offsets are.

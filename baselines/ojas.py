@@ -30,12 +30,12 @@ from artde_gym.robots.ojas import task
 from artde_gym.robots.ojas.model import ActuatorInertia, ojas
 from baselines.agent import JOINTS as ON_JOINTS
 from baselines.agent import Agent
-from baselines.legs import JOINTS, LEG, Mirror, ankle, level, mirrored_joints, moved
+from baselines.legs import JOINTS, LEG, Mirror, ankle, joint_offsets, level, mirrored_joints
 from baselines.ojas_tasks import TASKS
-from baselines.recipe import NO_BASE, Recipe
-from controllers.laws.second_order import FilterMemory, second_order
+from baselines.residual_config import NO_BASE, ResidualConfig
+from controllers.laws.second_order import FilterState, second_order
 from controllers.laws.tracking import Array, sliding_variable
-from controllers.policies import Plant
+from controllers.policies import ControlInterface
 
 RANGES: dict[str, dict[str, float]] = {
     "swing_x": {"synergies": 0.10, "wide-synergies": 0.15},  # m, of the swinging foot, forward
@@ -59,7 +59,7 @@ CLOSING = 0.5  # s, time constant of the closing gate
 DIFFERENCE = 1e-4  # s, of the reference velocity's difference quotient
 
 
-class OjasMemory(NamedTuple):
+class OjasAdapterState(NamedTuple):
     """What lasts.
 
     Attributes:
@@ -82,15 +82,15 @@ class OjasMemory(NamedTuple):
     offsets: Array
     action: Array
     target: Array
-    filter: FilterMemory
+    filter: FilterState
 
 
-class OjasCoupling:
-    """The coupling at the top.
+class OjasAdapter:
+    """The adapter at the top.
 
     Args:
-        plant: of the environment.
-        recipe: of the residual.
+        interface: of the environment.
+        config: of the residual.
         gains: of the base, for s; None without one.
     """
 
@@ -103,17 +103,19 @@ class OjasCoupling:
         "fall": -20.0,
     }
 
-    def __init__(self, plant: Plant, recipe: Recipe, gains: Any) -> None:
-        torque = recipe.base == NO_BASE
-        self._synergies = recipe.channel != "joints" and not torque
-        self._sizes = np.array([sizes[recipe.channel] for sizes in RANGES.values()]) if self._synergies else np.ones(1)
-        self._limit = float(plant.action.box().high[0]) if torque else recipe.limit
-        self._gated = recipe.gated and not torque
-        self._period = plant.control_period
-        self._hold = recipe.hold
+    def __init__(self, interface: ControlInterface, config: ResidualConfig, gains: Any) -> None:
+        torque = config.base == NO_BASE
+        self._synergies = config.action_mode != "joints" and not torque
+        self._sizes = (
+            np.array([sizes[config.action_mode] for sizes in RANGES.values()]) if self._synergies else np.ones(1)
+        )
+        self._limit = float(interface.action.box().high[0]) if torque else config.action_scale
+        self._gated = config.gated and not torque
+        self._period = interface.control_period
+        self._hold = config.decision_period
         self._gains = (gains.k_p, gains.k_d) if hasattr(gains, "k_p") else None
-        self._mirror = Mirror(plant.observation)
-        self._at = plant.observation.slices
+        self._mirror = Mirror(interface.observation)
+        self._at = interface.observation.slices
         self.actions: tuple[str, ...] = tuple(RANGES) if self._synergies else tuple(f"q{i + 1}" for i in range(JOINTS))
         self.features = Layout(
             (
@@ -135,10 +137,10 @@ class OjasCoupling:
             )
         )
 
-    def start(self, observation: Array) -> OjasMemory:
+    def start(self, observation: Array) -> OjasAdapterState:
         lead, kind = observation.shape[:-1], observation.dtype
         no, nothing = np.zeros(lead, np.bool_), np.zeros((*lead, JOINTS), kind)
-        return OjasMemory(
+        return OjasAdapterState(
             no,
             no,
             np.zeros(lead, kind),
@@ -147,10 +149,12 @@ class OjasCoupling:
             np.zeros((*lead, 4), kind),
             np.zeros((*lead, len(self.actions)), kind),
             nothing,
-            FilterMemory(nothing, nothing),
+            FilterState(nothing, nothing),
         )
 
-    def observe(self, observation: Array, inside: Mapping[str, Array], memory: OjasMemory) -> tuple[Array, OjasMemory]:
+    def observe(
+        self, observation: Array, inside: Mapping[str, Array], state: OjasAdapterState
+    ) -> tuple[Array, OjasAdapterState]:
         at = self._at
         right = observation[..., at["load_left_ref"].start] < 0.5
         seen = np.where(right[..., None], self._mirror(observation), observation)
@@ -166,10 +170,10 @@ class OjasCoupling:
         displacement = ankles[..., 0, :] - level(tilt, ankles[..., 2, :])
         sideways = velocity_error[..., :2]
         drift = np.vecdot(sideways, sideways)
-        gate = self._gate(tilt, drift, memory.gate)
+        gate = self._gate(tilt, drift, state.gate)
         load = seen[..., at["load_left_ref"]]
-        changed = right != memory.right
-        offsets, action = memory.offsets, memory.action
+        changed = right != state.right
+        offsets, action = state.offsets, state.action
         if changed.any():
             offsets = np.where(changed[..., None], _swapped(offsets), offsets)
         s = np.zeros_like(e) if self._gains is None else sliding_variable(e, ed, *self._gains)
@@ -196,7 +200,7 @@ class OjasCoupling:
             np.zeros_like(load) if c is None else c[..., None],
             action,
         ]
-        kept = memory._replace(
+        kept = state._replace(
             right=right,
             single=load[..., 0] > _SINGLE,
             gate=gate,
@@ -206,46 +210,46 @@ class OjasCoupling:
         )
         return np.concatenate(parts, axis=-1, dtype=observation.dtype), kept
 
-    def decide(self, memory: OjasMemory, action: Array) -> OjasMemory:
-        action = np.minimum(np.maximum(action, -1.0), 1.0).astype(memory.action.dtype)
-        scaled = memory.gate[..., None] * action
+    def set_action(self, state: OjasAdapterState, action: Array) -> OjasAdapterState:
+        action = np.minimum(np.maximum(action, -1.0), 1.0).astype(state.action.dtype)
+        scaled = state.gate[..., None] * action
         if not self._synergies:
             target = self._limit * scaled
-            return memory._replace(action=action, target=_unmirrored(memory.right, target))
+            return state._replace(action=action, target=_unmirrored(state.right, target))
         wanted = scaled * self._sizes
-        offsets = memory.offsets
+        offsets = state.offsets
         in_air = np.stack([wanted[..., 0], -wanted[..., 1]], axis=-1)
-        flying = np.where(memory.single[..., None], in_air, offsets[..., 2:])
+        flying = np.where(state.single[..., None], in_air, offsets[..., 2:])
         offsets = np.concatenate([offsets[..., :2], flying], axis=-1)
-        feet = np.zeros((*memory.ankles.shape[:-1], 3), action.dtype)
+        feet = np.zeros((*state.ankles.shape[:-1], 3), action.dtype)
         feet[..., 0, :2], feet[..., 1, :2] = offsets[..., :2], offsets[..., 2:]
         feet[..., :2] -= wanted[..., None, 3:5]
         feet[..., 1, 2] = wanted[..., 2]
-        joints = moved(memory.ankles, feet)
+        joints = joint_offsets(state.ankles, feet)
         joints[..., 4:] += wanted[..., 5:9].reshape(*wanted.shape[:-1], 2, 2)
         joints[..., 2] += wanted[..., None, 9]
         joints[..., 1] += wanted[..., None, 10]
         target = joints.reshape(*wanted.shape[:-1], JOINTS)
-        return memory._replace(offsets=offsets, action=action, target=_unmirrored(memory.right, target))
+        return state._replace(offsets=offsets, action=action, target=_unmirrored(state.right, target))
 
-    def advance(self, memory: OjasMemory) -> tuple[Array, OjasMemory]:
+    def next_residual(self, state: OjasAdapterState) -> tuple[Array, OjasAdapterState]:
         if not self._synergies:
-            return memory.target, memory
-        before = memory.filter
-        after = second_order(before, memory.target, FILTER_RATE, 1.0, self._period)
+            return state.target, state
+        before = state.filter
+        after = second_order(before, state.target, FILTER_RATE, 1.0, self._period)
         du = (after.rate - before.rate) / self._period + K_D * before.rate + K_P * before.value
-        return np.minimum(np.maximum(du, -self._limit), self._limit), memory._replace(filter=after)
+        return np.minimum(np.maximum(du, -self._limit), self._limit), state._replace(filter=after)
 
-    def reward_terms(self, observation: Array, memory: OjasMemory, fell: Any) -> dict[str, Array]:
-        at, action = self._at, memory.action
+    def reward_terms(self, observation: Array, state: OjasAdapterState, fell: Any) -> dict[str, Array]:
+        at, action = self._at, state.action
         tilt = observation[..., at["tilt"]]
         e = observation[..., at["q_ref"]] - observation[..., at["q"]]
         return {
             "alive": np.ones(observation.shape[:-1]),
             "upright": np.exp(-np.vecdot(tilt, tilt) / 0.02),
-            "velocity": np.exp(-memory.drift / 0.1),
+            "velocity": np.exp(-state.drift / 0.1),
             "tracking": np.exp(-np.vecdot(e, e) / 0.02),
-            "residual": memory.gate * np.vecdot(action, action),
+            "residual": state.gate * np.vecdot(action, action),
             "fall": np.asarray(fell, dtype=np.float64),
         }
 
@@ -284,9 +288,9 @@ def _nominal_name(kwargs: Mapping[str, Any]) -> str:
 
 AGENT = Agent(
     robot="ojas",
-    coupling=OjasCoupling,
-    channels={"synergies": 250.0, "wide-synergies": 250.0, ON_JOINTS: 25.0},  # ranges bound synergies long before
-    hold=0.02,
+    adapter=OjasAdapter,
+    action_modes={"synergies": 250.0, "wide-synergies": 250.0, ON_JOINTS: 25.0},  # ranges bound synergies long before
+    decision_period=0.02,
     tasks=TASKS,
     balanced=frozenset({"synergies", "wide-synergies"}),
     observation=task.OBSERVATION,

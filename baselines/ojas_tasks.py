@@ -36,7 +36,7 @@ def _pushed(level: float, payload: float, unpushed: int) -> dict[str, Any]:
             "position": [uniform(-0.02, 0.02), uniform(-0.02, 0.02), uniform(0.14, 0.18)],
         },
         "friction": uniform(0.6, 0.9),
-        "mass_error": uniform(0.97, 1.03),
+        "mass_scale": uniform(0.97, 1.03),
     }
 
 

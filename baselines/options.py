@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from artde_gym.errors import OptionError, among
+from artde_gym.errors import OptionError, suggest_names
 
 ALGORITHMS = ("ppo", "sac", "cma-es")
 MANY = 2**31 - 1
@@ -30,7 +30,9 @@ def check_options(algo: str, given: Any) -> None:
     known = OPTIONS[algo]
     for name, value in given.items():
         if name not in known:
-            raise OptionError(f"option of {algo}", name, among(name, known) if known else "none: it takes no options")
+            raise OptionError(
+                f"option of {algo}", name, suggest_names(name, known) if known else "none: it takes no options"
+            )
         if not known[name].good(value):
             raise OptionError(f"options: {name}", value, known[name].allowed)
 

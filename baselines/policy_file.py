@@ -18,11 +18,11 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 import artde_gym
-from artde_gym.arguments import file_name, flag, number, reading
+from artde_gym.arguments import check_bool, check_file_name, check_number, wrap_read_errors
 from artde_gym.layout import Layout
 from baselines.errors import PolicyFileError
 from baselines.network import Network
-from baselines.recipe import LONGEST, Recipe
+from baselines.residual_config import LONGEST, ResidualConfig
 
 VERSION = 1
 DESCRIPTION, WEIGHTS = "policy.json", "weights.npz"
@@ -33,7 +33,7 @@ class Saved(NamedTuple):
     """A policy as it lies in a folder."""
 
     name: str
-    recipe: Recipe
+    config: ResidualConfig
     network: Network
     features: str
     actions: tuple[str, ...]
@@ -62,7 +62,7 @@ def save(folder: Path, saved: Saved) -> None:
         "version": VERSION,
         "artde_gym": artde_gym.__version__,
         "name": saved.name,
-        "recipe": {**dataclasses.asdict(saved.recipe), "gains": dict(saved.recipe.gains)},
+        "recipe": {**dataclasses.asdict(saved.config), "gains": dict(saved.config.gains)},
         "control_period": saved.control_period,
         "nominal_robot": saved.nominal,
         "features_sha256": saved.features,
@@ -87,7 +87,7 @@ def read(folder: Path) -> Saved:
     Raises:
         PolicyFileError: if it is missing, damaged, of another version, or not of this form.
     """
-    with reading("policy", folder, f"a folder with {DESCRIPTION} and {WEIGHTS}", PolicyFileError):
+    with wrap_read_errors("policy", folder, f"a folder with {DESCRIPTION} and {WEIGHTS}", PolicyFileError):
         description = json.loads((folder / DESCRIPTION).read_text(encoding="utf-8"))
         content = (folder / WEIGHTS).read_bytes()
     if not isinstance(description, Mapping):
@@ -97,7 +97,7 @@ def read(folder: Path) -> Saved:
         raise PolicyFileError(f"version of {folder / DESCRIPTION}", version, f"{VERSION}, what this release reads")
     if hashlib.sha256(content).hexdigest() != description.get("weights_sha256"):
         raise PolicyFileError("weights", str(folder / WEIGHTS), f"the file that {DESCRIPTION} was written with")
-    with reading("policy", folder, "what `baselines` writes", PolicyFileError):
+    with wrap_read_errors("policy", folder, "what `baselines` writes", PolicyFileError):
         return _saved(description, content)
 
 
@@ -107,12 +107,12 @@ def _saved(description: Mapping[str, Any], content: bytes) -> Saved:
     if shape["activation"] != "tanh":
         raise PolicyFileError("network: activation", shape["activation"], "'tanh'")
     return Saved(
-        file_name("name", description["name"]),
-        Recipe(**_of("recipe", description["recipe"], dict)),
-        _network(content, _sizes(shape["sizes"]), flag("network: squashed", shape["squashed"])),
+        check_file_name("name", description["name"]),
+        ResidualConfig(**_of("recipe", description["recipe"], dict)),
+        _network(content, _sizes(shape["sizes"]), check_bool("network: squashed", shape["squashed"])),
         _of("features_sha256", description["features_sha256"], str),
         tuple(_of("actions", name, str) for name in _of("actions", description["actions"], list)),
-        number(
+        check_number(
             "control_period", description["control_period"], 1e-6, LONGEST, f"a number from 1e-6 to {LONGEST:g} (s)"
         ),
         _of("nominal_robot", description["nominal_robot"], str),

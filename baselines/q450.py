@@ -17,9 +17,9 @@ from artde_gym.robots.q450 import task
 from artde_gym.robots.q450.model import q450
 from baselines.agent import Agent
 from baselines.q450_tasks import TASKS
-from baselines.recipe import NO_BASE, Recipe
+from baselines.residual_config import NO_BASE, ResidualConfig
 from controllers.laws.tracking import Array, sliding_variable
-from controllers.policies import Plant
+from controllers.policies import ControlInterface
 
 AXES = ("x", "y", "z")
 TURNS = ("roll", "pitch", "yaw")
@@ -39,7 +39,7 @@ wind's doing, and in that noise an action of 15 ms is not to be found."""
 WORST = 10.0  # units
 
 
-class Q450Memory(NamedTuple):
+class Q450AdapterState(NamedTuple):
     """The action that acts (..., n), and the attitude's errors e_q and e_w (..., 3)."""
 
     action: Array
@@ -47,12 +47,12 @@ class Q450Memory(NamedTuple):
     e_w: Array
 
 
-class Q450Coupling:
-    """The coupling at the top; without a base, the action is the wrench.
+class Q450Adapter:
+    """The adapter at the top; without a base, the action is the wrench.
 
     Args:
-        plant: of the environment.
-        recipe: of the residual.
+        interface: of the environment.
+        config: of the residual.
         gains: of the base's position loop, for s; None without one.
     """
 
@@ -66,25 +66,25 @@ class Q450Coupling:
         "fall": -100.0,
     }
 
-    def __init__(self, plant: Plant, recipe: Recipe, gains: Any) -> None:
-        torque = recipe.base == NO_BASE
+    def __init__(self, interface: ControlInterface, config: ResidualConfig, gains: Any) -> None:
+        torque = config.base == NO_BASE
         self.actions: tuple[str, ...]
         if torque:
             self.actions = ("u1", "u2", "u3", "u4")
-            box = plant.action.box()
+            box = interface.action.box()
             self._limit = (box.high - box.low) / 2
-        elif recipe.channel == "position":
+        elif config.action_mode == "position":
             self.actions = AXES
-            self._limit = np.full(3, recipe.limit)
+            self._limit = np.full(3, config.action_scale)
         else:
-            whole = recipe.channel == "cascade"
+            whole = config.action_mode == "cascade"
             self.actions = AXES + TURNS if whole else TURNS
-            self._limit = recipe.limit * np.repeat([1.0, TURNING] if whole else [TURNING], 3)
-        self._attitude_alone = recipe.channel == "attitude" and not torque
+            self._limit = config.action_scale * np.repeat([1.0, TURNING] if whole else [TURNING], 3)
+        self._attitude_alone = config.action_mode == "attitude" and not torque
         loop: Any = getattr(gains, "position", None)
         self._gains = (loop.k_p, loop.k_d) if hasattr(loop, "k_p") else None
-        self._at = plant.observation.slices
-        own = [field for field in plant.observation.fields if field.name in PASSED_ON]
+        self._at = interface.observation.slices
+        own = [field for field in interface.observation.fields if field.name in PASSED_ON]
         self.features = Layout(
             (
                 Field("e", 3, "m", -1.0, 1.0, "position_ref - position"),
@@ -102,11 +102,13 @@ class Q450Coupling:
         )
         self._own = [self._at[field.name] for field in own]
 
-    def start(self, observation: Array) -> Q450Memory:
+    def start(self, observation: Array) -> Q450AdapterState:
         nothing = np.zeros((*observation.shape[:-1], 3), observation.dtype)
-        return Q450Memory(np.zeros((*nothing.shape[:-1], len(self.actions)), observation.dtype), nothing, nothing)
+        return Q450AdapterState(np.zeros((*nothing.shape[:-1], len(self.actions)), observation.dtype), nothing, nothing)
 
-    def observe(self, observation: Array, inside: Mapping[str, Array], memory: Q450Memory) -> tuple[Array, Q450Memory]:
+    def observe(
+        self, observation: Array, inside: Mapping[str, Array], state: Q450AdapterState
+    ) -> tuple[Array, Q450AdapterState]:
         e, ed = self._errors(observation)
         nothing = np.zeros(e.shape, e.dtype)
         s = nothing if self._gains is None else sliding_variable(e, ed, *self._gains)
@@ -122,21 +124,21 @@ class Q450Coupling:
             inside.get("force_command", nothing),
             nothing[..., :1] if c is None else c[..., None],
             *(observation[..., part] for part in self._own),
-            memory.action,
+            state.action,
         ]
-        return np.concatenate(parts, axis=-1, dtype=observation.dtype), memory._replace(e_q=e_q, e_w=e_w)
+        return np.concatenate(parts, axis=-1, dtype=observation.dtype), state._replace(e_q=e_q, e_w=e_w)
 
-    def decide(self, memory: Q450Memory, action: Array) -> Q450Memory:
-        return memory._replace(action=np.minimum(np.maximum(action, -1.0), 1.0).astype(memory.action.dtype))
+    def set_action(self, state: Q450AdapterState, action: Array) -> Q450AdapterState:
+        return state._replace(action=np.minimum(np.maximum(action, -1.0), 1.0).astype(state.action.dtype))
 
-    def advance(self, memory: Q450Memory) -> tuple[Array, Q450Memory]:
-        du = (self._limit * memory.action).astype(memory.action.dtype, copy=False)
-        return (np.concatenate([np.zeros(du.shape, du.dtype), du], axis=-1) if self._attitude_alone else du), memory
+    def next_residual(self, state: Q450AdapterState) -> tuple[Array, Q450AdapterState]:
+        du = (self._limit * state.action).astype(state.action.dtype, copy=False)
+        return (np.concatenate([np.zeros(du.shape, du.dtype), du], axis=-1) if self._attitude_alone else du), state
 
-    def reward_terms(self, observation: Array, memory: Q450Memory, fell: Any) -> dict[str, Array]:
+    def reward_terms(self, observation: Array, state: Q450AdapterState, fell: Any) -> dict[str, Array]:
         e, ed = self._errors(observation)
-        action = memory.action
-        errors = dict(zip(SCALES, (e, ed, memory.e_q, memory.e_w), strict=True))
+        action = state.action
+        errors = dict(zip(SCALES, (e, ed, state.e_q, state.e_w), strict=True))
         return {
             "alive": np.ones(observation.shape[:-1]),
             **{name: np.minimum(np.sqrt(np.vecdot(v, v)) / SCALES[name], WORST) for name, v in errors.items()},
@@ -154,9 +156,9 @@ class Q450Coupling:
 
 AGENT = Agent(
     robot="q450",
-    coupling=Q450Coupling,
-    channels={"attitude": 0.5, "position": 0.5, "cascade": 0.5},
-    hold=0.015,
+    adapter=Q450Adapter,
+    action_modes={"attitude": 0.5, "position": 0.5, "cascade": 0.5},
+    decision_period=0.015,
     tasks=TASKS,
     observation=task.OBSERVATION,
     action=task.ACTION,

@@ -16,20 +16,20 @@ def _flight(level: float) -> dict[str, Any]:
         "payload": {
             "mass": uniform(0.05, 0.5),
             "position": [uniform(-0.02, 0.02), uniform(-0.02, 0.02), uniform(-0.12, -0.08)],
-            "drop": uniform(4.0, 30.0),
+            "detach_time": uniform(4.0, 30.0),
         },
         "wind": {
             "scale": uniform(0.0, 1.0 + 1.5 * level),
-            "fan_place": [uniform(-1.2, 1.2), uniform(-0.6, 0.6), uniform(0.4, 0.8)],
+            "fan_position": [uniform(-1.2, 1.2), uniform(-0.6, 0.6), uniform(0.4, 0.8)],
             "fan_direction": ANYWHERE,
         },
         "ground_effect": uniform(0.0, 1.5),
-        "mass_error": uniform(0.9, 1.1),
+        "mass_scale": uniform(0.9, 1.1),
     }
 
 
 def _accuracy(rows: pd.DataFrame) -> float:
-    """Minus the RMS position error (m), plus a metre for a crash."""
+    """Minus the RMS position error (m), plus a meter for a crash."""
     fell, error = np.asarray(rows["fell"], np.float64), np.asarray(rows["rmse_m"], np.float64)
     return float(-(error + fell).mean())
 
@@ -49,7 +49,7 @@ TASKS: dict[str, Task] = {
         robot="q450",
         kwargs={"duration": 35.0},
         training=_flight,
-        test={"payload": {"mass": 0.35, "drop": 20.0}, "wind": 2.0, "ground_effect": 1.0},
+        test={"payload": {"mass": 0.35, "detach_time": 20.0}, "wind": 2.0, "ground_effect": 1.0},
         episodes=16,
         score=_accuracy,
         batch_engine=None,

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from artde_gym.arguments import action_array
 from artde_gym.disturbances.schedule import EVENTS
-from baselines.coupling import total
-from baselines.recipe import Recipe
-from baselines.residual import Residual, ResidualMemory
+from baselines.action_adapter import total
+from baselines.residual import Residual, ResidualState
+from baselines.residual_config import ResidualConfig
 from controllers.laws.tracking import Array
 
 Float = NDArray[np.float32]
@@ -25,12 +25,12 @@ RESIDUAL = "residual_"  # before names of the terms of its reward
 class ResidualEnv(gym.Wrapper[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]):
     """An environment of this project under a base controller, whose residual is the action.
 
-    One step is one decision: `Recipe.hold` seconds, in which the base controls at its own rate. Zero action is the base
+    One step is one decision: `ResidualConfig.decision_period` seconds, in which the base controls at its own rate. Zero action is the base
     controller alone, bit for bit.
 
     Args:
         env: the environment, wrapped or not.
-        recipe: of the residual.
+        config: of the residual.
 
     ## Action
     `Box(-1, 1, (n,), float32)`; its components are `actions` (names), what they do is told by `baselines.ojas` and
@@ -44,24 +44,24 @@ class ResidualEnv(gym.Wrapper[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[
     `residual_` before its name.
 
     Raises:
-        OptionError: if the recipe is another robot's, or `hold` is no whole number of control periods.
+        OptionError: if the configuration is another robot's, or `decision_period` is no whole number of control periods.
     """
 
-    def __init__(self, env: gym.Env[Any, Any], recipe: Recipe) -> None:
+    def __init__(self, env: gym.Env[Any, Any], config: ResidualConfig) -> None:
         super().__init__(env)
-        self.residual = Residual.of(env, recipe)
+        self.residual = Residual.of(env, config)
         self.agent_layout = self.residual.features
         self.actions = self.residual.actions
         self.observation_space = agent_space(self.residual)
         self.action_space = action_space(self.residual)
-        self._memory: ResidualMemory | None = None
+        self._memory: ResidualState | None = None
         self._observation: Array = np.zeros(0)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Float, dict[str, Any]]:
         """Start an episode; seed and options are the environment's."""
         self._observation, info = self.env.reset(seed=seed, options=options)
         self._memory = self.residual.start(self._observation)
-        info |= {RESIDUAL + name: 0.0 for name in self.residual.coupling.reward_scales}
+        info |= {RESIDUAL + name: 0.0 for name in self.residual.adapter.reward_scales}
         return self._features(), info
 
     def step(self, action: NDArray[Any]) -> tuple[Float, float, bool, bool, dict[str, Any]]:
@@ -75,7 +75,7 @@ class ResidualEnv(gym.Wrapper[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[
             raise gym.error.ResetNeeded("the episode has not begun: call reset()")
         action = action_array(action, len(self.actions), "numbers from -1 to 1")
         action = np.minimum(np.maximum(action, -1.0), 1.0)
-        memory = self.residual.decide(self._memory, action)
+        memory = self.residual.set_action(self._memory, action)
         terminated = truncated = False
         info: dict[str, Any] = {}
         events: Counter[str] = Counter()
@@ -88,10 +88,10 @@ class ResidualEnv(gym.Wrapper[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[
         info |= events
         self._memory = memory
         features = self._features()
-        coupling = self.residual.coupling
-        terms = coupling.reward_terms(self._observation, self._memory.coupling, terminated)
+        adapter = self.residual.adapter
+        terms = adapter.reward_terms(self._observation, self._memory.adapter, terminated)
         info |= {RESIDUAL + name: float(value) for name, value in terms.items()}
-        reward = float(total(coupling.reward_scales, terms))
+        reward = float(total(adapter.reward_scales, terms))
         return features, reward, bool(terminated), bool(truncated), info
 
     def _features(self) -> Float:

@@ -17,19 +17,19 @@ import gymnasium as gym
 import numpy as np
 
 import artde_gym
-from artde_gym.arguments import number, reading
-from artde_gym.errors import among
+from artde_gym.arguments import check_number, wrap_read_errors
+from artde_gym.errors import suggest_names
 from artde_gym.evaluation import evaluate
-from artde_gym.evaluation.cells import cells_of, tried
-from artde_gym.evaluation.environments import Backend, with_engine
+from artde_gym.evaluation.cells import cells_of, validate_cell
+from artde_gym.evaluation.environments import with_engine
 from artde_gym.evaluation.store import write_atomically
 from artde_gym.evaluation.workers import check_workers
 from baselines.errors import TrainingError
 from baselines.network import Network
 from baselines.options import ALGORITHMS, check_options
 from baselines.policy_file import Saved, layout_hash, save
-from baselines.recipe import Recipe
 from baselines.residual import Residual, ResidualPolicy
+from baselines.residual_config import ResidualConfig
 from baselines.residual_env import ResidualEnv
 from baselines.saved import EXPORT, load, nominal_name
 from baselines.tasks import HELD_OUT, task
@@ -46,7 +46,7 @@ class Training:
 
     Attributes:
         env_id: of the environment.
-        recipe: of the residual.
+        config: of the residual.
         algo: "ppo", "sac", or "cma-es" for the gains of the linear balance law.
         steps: decisions of the agent, all environments together.
         seed: of everything.
@@ -63,7 +63,7 @@ class Training:
     """
 
     env_id: str
-    recipe: Recipe
+    config: ResidualConfig
     algo: str = "ppo"
     steps: int = 1_000_000
     seed: int = 0
@@ -77,7 +77,7 @@ class Training:
 
     def __post_init__(self) -> None:
         if self.algo not in ALGORITHMS:
-            raise TrainingError("algo", self.algo, among(self.algo, ALGORITHMS))
+            raise TrainingError("algo", self.algo, suggest_names(self.algo, ALGORITHMS))
         counts = {"steps": self.steps, "workers": self.workers, "test_every": self.test_every, "envs": self.envs or 1}
         for field, value in {**counts, "patience": self.patience}.items():
             if not (type(value) is int and value >= 1):
@@ -85,9 +85,9 @@ class Training:
         if not (type(self.seed) is int and 0 <= self.seed <= LARGEST_SEED):
             raise TrainingError("seed", self.seed, f"a whole number from 0 to {LARGEST_SEED}")
         if self.level is not None:
-            number("level", self.level, 0.0, 1.0, "a number from 0 to 1, or None")
-        if self.recipe.robot != task(self.env_id).robot:
-            raise TrainingError("robot of the recipe", self.recipe.robot, f"{task(self.env_id).robot!r}")
+            check_number("level", self.level, 0.0, 1.0, "a number from 0 to 1, or None")
+        if self.config.robot != task(self.env_id).robot:
+            raise TrainingError("robot of the recipe", self.config.robot, f"{task(self.env_id).robot!r}")
         check_options(self.algo, self.options)
 
 
@@ -122,8 +122,8 @@ class Run:
         self.state: dict[str, Any] = {"best": None, "stale": 0, "tests": []}
         self._configuration = _plain(training) | {"engine": environment_kwargs(training).get("engine")}
         _refuse_others(folder, self._configuration, {"workers"} if self.batched else set())
-        (cell,) = cells_of(training.env_id, None, environment_kwargs(training), self.task.test, self.backend)
-        tried(self.backend, cell)
+        (cell,) = cells_of(training.env_id, None, environment_kwargs(training), self.task.test, self.vectorized)
+        validate_cell(self.vectorized, cell)
 
     @property
     def batched(self) -> bool:
@@ -134,7 +134,7 @@ class Run:
         return engine is None or environment_kwargs(self.training).get("engine") == engine
 
     @property
-    def backend(self) -> Backend:
+    def vectorized(self) -> Backend:
         """The backend of the held-out tests."""
         return "batch" if self.batched else "single"
 
@@ -157,7 +157,7 @@ class Run:
         """
         if isinstance(residual.base, ResidualPolicy):
             raise TrainingError(
-                "base", self.training.recipe.base, "a law; a policy's file does not hold another policy"
+                "base", self.training.config.base, "a law; a policy's file does not hold another policy"
             )
         if not self.state["tests"]:
             size, count = residual.features.size, len(residual.actions)
@@ -193,7 +193,7 @@ class Run:
             episodes=episodes,
             seed=HELD_OUT,
             workers=workers,
-            backend=self.backend,
+            vectorized=self.vectorized,
         ).episodes
         means = {name: float(np.mean(rows[name].to_numpy())) for name in _SHOWN if name in rows}
         return {"score": self.task.score(rows), **means}
@@ -201,13 +201,13 @@ class Run:
     def _saved(self, network: Network, residual: Residual, steps: int) -> Saved:
         training, kwargs = self.training, environment_kwargs(self.training)
         return Saved(
-            f"{training.recipe.base}+{LABELS.get(training.algo, training.algo)}",
-            residual.recipe,
+            f"{training.config.base}+{LABELS.get(training.algo, training.algo)}",
+            residual.config,
             network,
             layout_hash(residual.features),
             tuple(residual.actions),
-            residual.recipe.hold / residual.periods,
-            nominal_name(training.recipe.robot, kwargs),
+            residual.config.decision_period / residual.periods,
+            nominal_name(training.config.robot, kwargs),
             {
                 "algorithm": training.algo,
                 "env_id": training.env_id,
@@ -229,9 +229,9 @@ def environment_kwargs(training: Training) -> dict[str, Any]:
     return given if known.batch_engine is None else with_engine(training.env_id, given)  # else a batch is an engine
 
 
-def single(env_id: str, kwargs: dict[str, Any], recipe: Recipe) -> ResidualEnv:
+def single(env_id: str, kwargs: dict[str, Any], config: ResidualConfig) -> ResidualEnv:
     """One environment for an agent."""
-    return ResidualEnv(gym.make(env_id, disable_env_checker=True, **kwargs), recipe)
+    return ResidualEnv(gym.make(env_id, disable_env_checker=True, **kwargs), config)
 
 
 def _plain(training: Training) -> dict[str, Any]:
@@ -251,7 +251,7 @@ def _refuse_others(folder: Path, configuration: dict[str, Any], free: set[str]) 
     file = folder / RECORD
     if not file.exists():
         return
-    with reading("run", file, "a file that `train` wrote", TrainingError):
+    with wrap_read_errors("run", file, "a file that `train` wrote", TrainingError):
         before = dict(json.loads(file.read_text(encoding="utf-8"))["configuration"])
     for name, value in configuration.items():
         if name not in {"steps", "options", "patience", *free} and before.get(name) != value:

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from artde_gym.errors import ArtdeGymError, OptionError, UnknownNameError, among
+from artde_gym.errors import ArtdeGymError, OptionError, UnknownNameError, suggest_names
 from artde_gym.evaluation.environments import ours, single
 from artde_gym.layout import Layout
 from baselines.agent import agent_of
@@ -14,7 +14,7 @@ from baselines.errors import PolicyFileError
 from baselines.policy_file import DESCRIPTION, Saved, layout_hash, read
 from baselines.residual import Residual, ResidualPolicy
 from controllers import GainError
-from controllers.policies import Plant
+from controllers.policies import ControlInterface
 
 SHIPPED = Path(__file__).parent / "policies"
 EXPORT = "policy"
@@ -53,24 +53,24 @@ def make_shipped(env: Any, *, policies: dict[str, str]) -> ResidualPolicy:
     """
     known = [path.name for path in SHIPPED.iterdir()]
     if not (isinstance(policies, dict) and all(name in known for name in policies.values())):
-        raise OptionError("policies", policies, f"a mapping of environments to {among(None, known)}")
+        raise OptionError("policies", policies, f"a mapping of environments to {suggest_names(None, known)}")
     spec = env.get_attr("spec")[0] if hasattr(env, "num_envs") else env.unwrapped.spec
     env_id = "" if spec is None else spec.id
     if env_id not in policies:
-        raise UnknownNameError("environment of a trained policy", env_id, among(env_id, policies))
+        raise UnknownNameError("environment of a trained policy", env_id, suggest_names(env_id, policies))
     return load(SHIPPED / policies[env_id], env)
 
 
 def _trained_in(saved: Saved) -> Any:
     """The environment of a policy's training, built only if its robot does not tell what the policy has to know."""
-    agent = agent_of(saved.recipe.robot)
+    agent = agent_of(saved.config.robot)
     if agent.observation is not None and agent.action is not None:
         if saved.nominal not in agent.nominal:
             raise PolicyFileError("nominal_robot", saved.nominal, ", ".join(map(repr, agent.nominal)))
         return _Trained(saved, agent.observation, agent.action, agent.nominal[saved.nominal]())
     env_id, kwargs = saved.about.get("env_id"), saved.about.get("env_kwargs")
     if env_id not in ours() or not isinstance(kwargs, dict):  # never a "module:id", which would be imported
-        raise PolicyFileError("about: env_id", env_id, among(env_id, ours()))
+        raise PolicyFileError("about: env_id", env_id, suggest_names(env_id, ours()))
     return single(env_id, json.dumps(kwargs))
 
 
@@ -78,7 +78,7 @@ class _Trained:
     """What a policy has to know of the environment of its training, without building it."""
 
     def __init__(self, saved: Saved, observation: Layout, action: Layout, nominal_robot: Any) -> None:
-        self.robot_name = saved.recipe.robot
+        self.robot_name = saved.config.robot
         self.observation_layout, self.action_layout = observation, action
         self.control_period = saved.control_period
         self.nominal_robot = nominal_robot
@@ -95,17 +95,17 @@ def nominal_name(robot: str, env_kwargs: dict[str, Any]) -> str:
 
 
 def _policy(saved: Saved, env: Any) -> ResidualPolicy:
-    plant = Plant.of(env)
-    if plant.robot != saved.recipe.robot:
-        raise PolicyFileError(f"robot of {saved.name!r}", saved.recipe.robot, f"{plant.robot!r} of the environment")
+    interface = ControlInterface.of(env)
+    if interface.robot != saved.config.robot:
+        raise PolicyFileError(f"robot of {saved.name!r}", saved.config.robot, f"{interface.robot!r} of the environment")
     try:
-        residual = Residual.of(env, saved.recipe)
+        residual = Residual.of(env, saved.config)
     except (ArtdeGymError, GainError):
         raise
     except Exception as error:  # the recipe's gains may be anything, for a base that takes almost any
-        raise PolicyFileError(f"recipe of {saved.name!r}", saved.recipe, f"one that works ({error!r})") from error
+        raise PolicyFileError(f"recipe of {saved.name!r}", saved.config, f"one that works ({error!r})") from error
     if layout_hash(residual.features) != saved.features or len(saved.network.mean) != residual.features.size:
         raise PolicyFileError(f"what {saved.name!r} sees", saved.features, f"{layout_hash(residual.features)} here")
     if tuple(residual.actions) != saved.actions or len(saved.network.layers[-1][1]) != len(residual.actions):
         raise PolicyFileError(f"what {saved.name!r} does", saved.actions, f"{tuple(residual.actions)} here")
-    return ResidualPolicy(saved.name, plant, residual, saved.network)
+    return ResidualPolicy(saved.name, interface, residual, saved.network)

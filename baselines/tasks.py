@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from artde_gym.errors import UnknownNameError, among
-from artde_gym.evaluation.environments import ours, robot_of, tracking_of
+from artde_gym.errors import UnknownNameError, suggest_names
+from artde_gym.evaluation.environments import metrics_spec_of, ours, robot_of
 from baselines.agent import agent_of
 from baselines.task import SAC, Task
 
@@ -24,13 +24,13 @@ def task(env_id: str) -> Task:
         UnknownNameError: if no robot has this environment.
     """
     if env_id not in ours():
-        raise UnknownNameError("environment to train in", env_id, among(env_id, ours()))
+        raise UnknownNameError("environment to train in", env_id, suggest_names(env_id, ours()))
     return agent_of(robot_of(env_id)).tasks.get(env_id) or own_task(env_id)
 
 
 def own_task(env_id: str) -> Task:
     """The task of an environment without one: its own disturbances, and as little tracking error as possible."""
-    metric = f"rmse_{tracking_of(env_id).errors[0].unit}"
+    metric = f"rmse_{metrics_spec_of(env_id).errors[0].unit}"
 
     def score(rows: pd.DataFrame) -> float:
         fell, error = np.asarray(rows["fell"], np.bool_), np.asarray(rows[metric], np.float64)

@@ -25,8 +25,8 @@ from artde_gym.layout import Layout
 from baselines.checkpoint import Checkpoints
 from baselines.errors import TrainingError
 from baselines.export import exported
-from baselines.recipe import Recipe
 from baselines.residual import Residual
+from baselines.residual_config import ResidualConfig
 from baselines.residual_env import ResidualEnv
 from baselines.rollouts import OpenRollouts
 from baselines.run import Progress, Run, Training, environment_kwargs, single
@@ -150,13 +150,13 @@ def environments(training: Training, run: Run) -> tuple[VecEnv, Residual]:
     """Environments of a training, and the residual that they share."""
     kwargs, task = environment_kwargs(training), run.task
     if run.batched:
-        env = batched(training.env_id, training.recipe, training.envs or task.envs, kwargs)
+        env = batched(training.env_id, training.config, training.envs or task.envs, kwargs)
         return env, env.residual
     count = training.envs or training.workers
     makers: list[Callable[[], gym.Env[Any, Any]]] = [
-        functools.partial(_worker_env, training.env_id, kwargs, training.recipe) for _ in range(count)
+        functools.partial(_worker_env, training.env_id, kwargs, training.config) for _ in range(count)
     ]
-    residual = single(training.env_id, kwargs, training.recipe).residual
+    residual = single(training.env_id, kwargs, training.config).residual
     return (DummyVecEnv(makers) if training.workers == 1 else _processes(makers)), residual
 
 
@@ -170,9 +170,9 @@ def _processes(makers: list[Callable[[], gym.Env[Any, Any]]]) -> VecEnv:
         raise WorkerError("worker processes", "ended when they had just started", allowed) from error
 
 
-def _worker_env(env_id: str, kwargs: dict[str, Any], recipe: Recipe) -> ResidualEnv:
+def _worker_env(env_id: str, kwargs: dict[str, Any], config: ResidualConfig) -> ResidualEnv:
     torch.set_num_threads(1)
-    return single(env_id, kwargs, recipe)
+    return single(env_id, kwargs, config)
 
 
 def _model(training: Training, env: VecNormalize, options: dict[str, Any], features: Layout) -> Any:

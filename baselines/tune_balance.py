@@ -15,7 +15,7 @@ import numpy as np
 from cmaes import CMA
 from numpy.typing import NDArray
 
-from artde_gym.arguments import reading
+from artde_gym.arguments import wrap_read_errors
 from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.store import write_atomically
 from baselines.agent import agent_of
@@ -40,18 +40,18 @@ def tune(training: Training, out: str | Path, on_progress: Callable[[Progress], 
     Raises:
         TrainingError: if `out` holds a run of another configuration, the robot has no such law, or the engine no batch.
     """
-    if training.recipe.channel not in agent_of(training.recipe.robot).balanced:
-        raise TrainingError("recipe", training.recipe, "the biped's synergies, of which the law has gains")
+    if training.config.action_mode not in agent_of(training.config.robot).balanced:
+        raise TrainingError("config", training.config, "the biped's synergies, of which the law has gains")
     run = Run(training, Path(out), on_progress)
     if not run.batched:
         raise TrainingError("engine", environment_kwargs(training).get("engine"), repr(run.task.batch_engine))
     kwargs = {**environment_kwargs(training), "duration": DURATION, "disturbances": _PUSH}
-    env = batched(training.env_id, training.recipe, POPULATION * PUSHES, kwargs)
+    env = batched(training.env_id, training.config, POPULATION * PUSHES, kwargs)
     residual = env.residual
     file = run.folder / "generations.json"
     told: list[dict[str, Any]] = []
     if file.exists():
-        with reading("generations", file, "a file that `train` wrote", TrainingError):
+        with wrap_read_errors("generations", file, "a file that `train` wrote", TrainingError):
             stored = json.loads(file.read_text(encoding="utf-8"))
             told = [{"costs": [float(cost) for cost in one["costs"]], "steps": int(one["steps"])}
                     for one in stored["generations"]]  # fmt: skip
@@ -90,7 +90,7 @@ def _mean(strategy: CMA) -> NDArray[np.float64]:
 def _judge(env: ResidualVecEnv, networks: list[Network], seeds: list[int]) -> tuple[list[float], int]:
     """Of each candidate one minus its mean return up to a fall, by what can be had at most; decisions taken."""
     weights = np.repeat([network.layers[0][0] for network in networks], len(seeds), axis=0)
-    law, recipe = networks[0], env.residual.recipe
+    law, config = networks[0], env.residual.config
     every = Network(law.mean, law.variance, ((weights, law.layers[0][1]),))  # a law of its own for each environment
     env.seed(seeds * len(networks))
     features: Any = env.reset()
@@ -101,5 +101,9 @@ def _judge(env: ResidualVecEnv, networks: list[Network], seeds: list[int]) -> tu
         returns += np.where(going, rewards, 0.0)
         count += int(going.sum())
         going &= ~done
-    most = DURATION / recipe.hold * sum(scale for scale in env.residual.coupling.reward_scales.values() if scale > 0)
+    most = (
+        DURATION
+        / config.decision_period
+        * sum(scale for scale in env.residual.adapter.reward_scales.values() if scale > 0)
+    )
     return (1.0 - returns.reshape(len(networks), -1).mean(axis=1) / most).tolist(), count

@@ -12,9 +12,9 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from artde_gym.arguments import real_array
 from artde_gym.errors import ActionError, OptionError
-from baselines.coupling import total
-from baselines.recipe import Recipe
-from baselines.residual import Residual, ResidualMemory
+from baselines.action_adapter import total
+from baselines.residual import Residual, ResidualState
+from baselines.residual_config import ResidualConfig
 from baselines.residual_env import action_space, agent_space
 from baselines.tasks import task
 from controllers.laws.tracking import Array
@@ -31,18 +31,18 @@ class ResidualVecEnv(VecEnv):
 
     Args:
         env: the batched environment.
-        recipe: of the residual.
+        config: of the residual.
 
     Raises:
-        OptionError: if the recipe is another robot's, or `hold` is no whole number of control periods.
+        OptionError: if the configuration is another robot's, or `decision_period` is no whole number of control periods.
     """
 
-    def __init__(self, env: Any, recipe: Recipe) -> None:
+    def __init__(self, env: Any, config: ResidualConfig) -> None:
         self.env = env
-        self.residual = Residual.of(env, recipe)
+        self.residual = Residual.of(env, config)
         super().__init__(env.num_envs, agent_space(self.residual), action_space(self.residual))
         self._observation: Array = np.zeros(0)
-        self._memory: ResidualMemory | None = None
+        self._memory: ResidualState | None = None
         self._action: Array = np.zeros(0)
         self._infos: list[dict[str, Any]] = [{} for _ in range(env.num_envs)]
 
@@ -75,7 +75,7 @@ class ResidualVecEnv(VecEnv):
     def step_wait(self) -> tuple[Float, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         if self._memory is None:
             raise gym.error.ResetNeeded("the episodes have not begun: call reset()")
-        observation, memory = self._observation, self.residual.decide(self._memory, self._action)
+        observation, memory = self._observation, self.residual.set_action(self._memory, self._action)
         fell = done = np.zeros(self.num_envs, np.bool_)
         for _ in range(self.residual.periods):
             force, after = self.residual.control(observation, memory)
@@ -86,9 +86,9 @@ class ResidualVecEnv(VecEnv):
             observation, memory = seen, after
             fell, done = fell | terminated, done | terminated | truncated
         features, memory = self._seen(observation, memory)
-        coupling = self.residual.coupling
-        terms = coupling.reward_terms(observation, memory.coupling, fell)
-        rewards = total(coupling.reward_scales, terms).astype(np.float32)
+        adapter = self.residual.adapter
+        terms = adapter.reward_terms(observation, memory.adapter, fell)
+        rewards = total(adapter.reward_scales, terms).astype(np.float32)
         infos = list(self._infos)
         if done.any():
             for i in np.flatnonzero(done).tolist():
@@ -118,13 +118,13 @@ class ResidualVecEnv(VecEnv):
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
         return [None] * self.num_envs
 
-    def _seen(self, observation: Array, memory: ResidualMemory) -> tuple[Float, ResidualMemory]:
+    def _seen(self, observation: Array, memory: ResidualState) -> tuple[Float, ResidualState]:
         features, memory = self.residual.observe(observation, memory)
         return features.astype(np.float32, order="C"), memory
 
 
-def batched(env_id: str, recipe: Recipe, count: int, kwargs: Mapping[str, Any]) -> ResidualVecEnv:
+def batched(env_id: str, config: ResidualConfig, count: int, kwargs: Mapping[str, Any]) -> ResidualVecEnv:
     """So many of an environment, built with `kwargs`, in one batch with an agent's action for each."""
     own = {name: value for name, value in kwargs.items() if name != "engine"}  # a batch is an engine
     own |= task(env_id).batch or {}
-    return ResidualVecEnv(gym.make_vec(env_id, count, vectorization_mode="vector_entry_point", **own), recipe)
+    return ResidualVecEnv(gym.make_vec(env_id, count, vectorization_mode="vector_entry_point", **own), config)

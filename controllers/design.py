@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from controllers.drive import DRIVES, Drive
 from controllers.law_table import LAWS
+from controllers.laws.stability import largest_joint_m_bar, largest_m_bar, tde_eigenvalues
 from controllers.laws.tde import TdeGains
 from controllers.laws.tracking import check_positive_number
-from controllers.laws.validity import largest_joint_m_bar, largest_m_bar, tde_eigenvalues
 from controllers.loop import Loop
 from controllers.presets import LOOPS, preset_gains
 
@@ -120,11 +120,13 @@ def loops(robot: str, **motion: Any) -> list[Loop]:
     """
     able = designed()
     if robot not in able:
-        raise UnknownNameError("robot", robot, among(robot, able))
+        raise UnknownNameError("robot", robot, suggest_names(robot, able))
     known = inspect.signature(able[robot]).parameters
     for name in motion:
         if name not in known:
-            raise OptionError(f"argument of {robot!r}", name, among(name, known) if known else "none: it takes none")
+            raise OptionError(
+                f"argument of {robot!r}", name, suggest_names(name, known) if known else "none: it takes none"
+            )
     return able[robot](**motion)
 
 
@@ -171,7 +173,7 @@ def design(
     """
     found = loops(robot, **motion)
     if law not in DELAYED:
-        raise UnknownNameError("law with a time-delay estimate", law, among(law, DELAYED))
+        raise UnknownNameError("law with a time-delay estimate", law, suggest_names(law, DELAYED))
     chosen = preset_gains(robot, law, preset, len(found[0].joints), gains or {})
     length = DRIVES[robot].period if period is None else period
     return [judge(loop, _of_loop(chosen, loop, law, length), length) for loop in found]

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
-from artde_gym.doctor.outcome import Outcome
+from artde_gym.doctor.check_result import CheckResult
 from artde_gym.registry import Registry
 from controllers.loop import Loop
 from controllers.policies import Policy
@@ -47,7 +47,7 @@ class Drive:
     make: Callable[..., Policy] | None = None
     period: float = 0.001
     loops: Callable[..., list[Loop]] | None = None
-    stability: Callable[[], Sequence[Outcome]] | None = None
+    stability: Callable[[], Sequence[CheckResult]] | None = None
 
 
 DRIVES: Registry[Drive] = Registry("drive", "artde_gym.drives", lambda drive: {drive.robot: drive})

@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from controllers.laws.errors import GainError
-from controllers.laws.tracking import Array, Memory, Signals
-from controllers.laws.velocity_estimate import EstimateMemory, estimate, estimate_start
-from controllers.policies import Plant, TrackingPolicy
+from controllers.laws.tracking import Array, JointInput, LawState
+from controllers.laws.velocity_estimate import EstimateState, estimate, estimate_init
+from controllers.policies import ControlInterface, TrackingPolicy
 
 
-class EncoderMemory(NamedTuple):
+class EncoderState(NamedTuple):
     """The estimator's memory and the law's."""
 
-    estimate: EstimateMemory
+    estimate: EstimateState
     law: Any
 
 
@@ -24,21 +24,21 @@ class EncoderPolicy(TrackingPolicy):
         GainError: for a cut-off frequency that is not above zero and below half the sampling rate.
     """
 
-    def __init__(self, inner: TrackingPolicy, plant: Plant, cutoff_hz: float) -> None:
-        nyquist = 0.5 / plant.control_period
+    def __init__(self, inner: TrackingPolicy, interface: ControlInterface, cutoff_hz: float) -> None:
+        nyquist = 0.5 / interface.control_period
         if not 0 < cutoff_hz < nyquist:
             raise GainError("velocity_cutoff_hz", cutoff_hz, f"above 0 and below {nyquist:g} Hz")
-        super().__init__(inner.name, plant, inner.gains)
+        super().__init__(inner.name, interface, inner.gains)
         self._inner = inner
         self._cutoff_hz = cutoff_hz
-        self._period = plant.control_period
+        self._period = interface.control_period
 
-    def start(self, signals: Signals) -> Memory:
-        memory = estimate_start(signals, self._period)
-        seen, _ = estimate(self._cutoff_hz, memory, signals, self._period)
-        return EncoderMemory(memory, self._inner.start(seen))
+    def start(self, signals: JointInput) -> LawState:
+        state = estimate_init(signals, self._period)
+        seen, _ = estimate(self._cutoff_hz, state, signals, self._period)
+        return EncoderState(state, self._inner.start(seen))
 
-    def step(self, memory: Any, signals: Signals, observation: Array) -> tuple[Array, Memory]:
-        seen, estimated = estimate(self._cutoff_hz, memory.estimate, signals, self._period)
-        force, law = self._inner.step(memory.law, seen, observation)
-        return force, EncoderMemory(estimated, law)
+    def step(self, state: Any, signals: JointInput, observation: Array) -> tuple[Array, LawState]:
+        seen, estimated = estimate(self._cutoff_hz, state.estimate, signals, self._period)
+        force, law = self._inner.step(state.law, seen, observation)
+        return force, EncoderState(estimated, law)

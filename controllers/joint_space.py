@@ -6,8 +6,8 @@ from typing import Any
 
 from controllers.encoders import EncoderPolicy
 from controllers.law_table import LAWS
-from controllers.laws.tracking import Array, Memory, Signals, check_positive_number
-from controllers.policies import Plant, TrackingPolicy
+from controllers.laws.tracking import Array, JointInput, LawState, check_positive_number
+from controllers.policies import ControlInterface, TrackingPolicy
 from controllers.presets import preset_gains
 
 
@@ -17,17 +17,17 @@ class LawPolicy(TrackingPolicy):
     `time_base` is the period L that the law divides by, over the true one.
     """
 
-    def __init__(self, name: str, plant: Plant, gains: Any, time_base: float = 1.0) -> None:
+    def __init__(self, name: str, interface: ControlInterface, gains: Any, time_base: float = 1.0) -> None:
         check_positive_number("time_base", time_base)
         self._law, convert = LAWS[name]
-        self._period = time_base * plant.control_period
-        super().__init__(name, plant, convert(gains, self._period))
+        self._period = time_base * interface.control_period
+        super().__init__(name, interface, convert(gains, self._period))
 
-    def start(self, signals: Signals) -> Memory:
+    def start(self, signals: JointInput) -> LawState:
         return self._law.start(self.gains, signals, self._period)
 
-    def step(self, memory: Any, signals: Signals, observation: Array) -> tuple[Array, Memory]:
-        return self._law.step(self.gains, memory, signals, self._period)
+    def step(self, state: Any, signals: JointInput, observation: Array) -> tuple[Array, LawState]:
+        return self._law.step(self.gains, state, signals, self._period)
 
 
 def make_joint_space(
@@ -42,7 +42,7 @@ def make_joint_space(
     """Build the policy of a law on all joints, at preset gains with some replaced.
 
     Args:
-        env: the environment that it will drive; its observation has the fields of `controllers.laws.tracking.Signals`.
+        env: the environment that it will drive; its observation has the fields of `controllers.laws.tracking.JointInput`.
         law: name of the law.
         preset: name of its gains; None for the law's default.
         velocity_cutoff_hz: with a number, velocities are estimated from the observed angles by a low-pass of this
@@ -55,8 +55,10 @@ def make_joint_space(
         UnknownNameError: for a law that the robot does not have, or an unknown preset.
         GainError: for an unknown gain or a value that is not allowed.
     """
-    plant = Plant.of(env)
-    policy = LawPolicy(law, plant, preset_gains(plant.robot, law, preset, plant.action.size, gains), time_base)
+    interface = ControlInterface.of(env)
+    policy = LawPolicy(
+        law, interface, preset_gains(interface.robot, law, preset, interface.action.size, gains), time_base
+    )
     if velocity_cutoff_hz is None:
         return policy
-    return EncoderPolicy(policy, plant, velocity_cutoff_hz)
+    return EncoderPolicy(policy, interface, velocity_cutoff_hz)

@@ -8,8 +8,8 @@ from artde_gym.multibody.support import Supported
 from artde_gym.registration import GainRange
 from controllers.law_table import Nothing
 from controllers.laws.computed_torque import ComputedTorqueGains, computed_torque
-from controllers.laws.tracking import Array, Memory, Signals
-from controllers.policies import Plant, TrackingPolicy
+from controllers.laws.tracking import Array, JointInput, LawState
+from controllers.policies import ControlInterface, TrackingPolicy
 from controllers.presets import gain_ranges, preset_gains
 
 
@@ -19,21 +19,21 @@ class ComputedTorquePolicy(TrackingPolicy):
     The model is the robot without payload and without pushes; the pattern says how the feet share the load.
     """
 
-    def __init__(self, plant: Plant, gains: ComputedTorqueGains) -> None:
-        super().__init__("computed-torque", plant, gains)
-        self._model = Supported(plant.nominal_robot)
-        self._load = plant.observation["load_left_ref"].start
+    def __init__(self, interface: ControlInterface, gains: ComputedTorqueGains) -> None:
+        super().__init__("computed-torque", interface, gains)
+        self._model = Supported(interface.nominal_robot)
+        self._load = interface.observation["load_left_ref"].start
 
-    def start(self, signals: Signals) -> Memory:
+    def start(self, signals: JointInput) -> LawState:
         return Nothing()
 
-    def step(self, memory: Any, signals: Signals, observation: Array) -> tuple[Array, Memory]:
+    def step(self, state: Any, signals: JointInput, observation: Array) -> tuple[Array, LawState]:
         load_left = observation[..., self._load]
 
         def inverse_dynamics(q: Array, qd: Array, qdd: Array) -> Array:
             return self._model.torque(load_left, q, qd, qdd).astype(q.dtype, copy=False)
 
-        return computed_torque(self.gains, signals, inverse_dynamics), memory
+        return computed_torque(self.gains, signals, inverse_dynamics), state
 
 
 def make_computed_torque(env: Any, *, preset: str | None = None, **gains: Any) -> ComputedTorquePolicy:
@@ -42,10 +42,12 @@ def make_computed_torque(env: Any, *, preset: str | None = None, **gains: Any) -
     Raises:
         UnknownNameError, GainError: as `controllers.joint_space.make_joint_space`.
     """
-    plant = Plant.of(env)
-    return ComputedTorquePolicy(plant, preset_gains(plant.robot, "computed-torque", preset, plant.action.size, gains))
+    interface = ControlInterface.of(env)
+    return ComputedTorquePolicy(
+        interface, preset_gains(interface.robot, "computed-torque", preset, interface.action.size, gains)
+    )
 
 
-def search_space(env: Any) -> dict[str, GainRange]:
+def tuning_space(env: Any) -> dict[str, GainRange]:
     """Where tuning may look for the gains."""
-    return gain_ranges(Plant.of(env).robot, "computed-torque", None)
+    return gain_ranges(ControlInterface.of(env).robot, "computed-torque", None)

@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from artde_gym.errors import OptionError
 from artde_gym.layout import Layout
-from controllers.laws.tracking import Array, Memory, Signals
+from controllers.laws.tracking import Array, JointInput, LawState
 
 
-class Plant(NamedTuple):
+class ControlInterface(NamedTuple):
     """What a policy has to know of the environment that it drives."""
 
     robot: str
@@ -27,7 +27,7 @@ class Plant(NamedTuple):
     nominal_robot: Any
 
     @classmethod
-    def of(cls, env: Any) -> Plant:
+    def of(cls, env: Any) -> ControlInterface:
         """Read from a Gymnasium environment, wrapped or not, or from a vector of equal ones (Gymnasium's or SB3's)."""
 
         def read(name: str) -> Any:
@@ -42,15 +42,15 @@ class Policy(abc.ABC):
 
     Args:
         name: under which results are listed.
-        plant: the environment that it drives.
+        interface: the environment that it drives.
         gains: of the law, in its own terms.
     """
 
-    def __init__(self, name: str, plant: Plant, gains: Any) -> None:
+    def __init__(self, name: str, interface: ControlInterface, gains: Any) -> None:
         self.name = name
         self.gains = gains
-        self._size = plant.observation.size
-        box = plant.action.box()
+        self._size = interface.observation.size
+        box = interface.action.box()
         self._low, self._high = box.low, box.high
 
     @abc.abstractmethod
@@ -58,26 +58,26 @@ class Policy(abc.ABC):
         """The signals of one sample in an observation (..., n_obs)."""
 
     @abc.abstractmethod
-    def start(self, signals: Any) -> Memory:
+    def start(self, signals: Any) -> LawState:
         """Memory before the first sample."""
 
     @abc.abstractmethod
-    def step(self, memory: Any, signals: Any, observation: Array) -> tuple[Array, Memory]:
+    def step(self, state: Any, signals: Any, observation: Array) -> tuple[Array, LawState]:
         """One sample: force (..., n) before saturation, and the memory for the next one."""
 
     @abc.abstractmethod
-    def accelerated(self, signals: Any, du: Array) -> Any:
+    def with_residual(self, signals: Any, du: Array) -> Any:
         """The signals with `du` (..., n) added to the reference acceleration, and so to the desired one of any law."""
 
     def predict(
         self,
         observation: ArrayLike,
-        state: Memory | None = None,
+        state: LawState | None = None,
         episode_start: ArrayLike | None = None,
         deterministic: bool = True,
         *,
         residual: ArrayLike | None = None,
-    ) -> tuple[Array, Memory]:
+    ) -> tuple[Array, LawState]:
         """The action for one observation (n_obs,) or for many (n_env, n_obs).
 
         Args:
@@ -102,40 +102,40 @@ class Policy(abc.ABC):
             if fresh.any():
                 state = choose(fresh, self.start(signals), state)
         if residual is not None:
-            signals = self.accelerated(signals, np.asarray(residual, dtype=given.dtype))
+            signals = self.with_residual(signals, np.asarray(residual, dtype=given.dtype))
         force, state = self.step(state, signals, given)
         clipped = np.minimum(np.maximum(force, self._low), self._high)
         return clipped if clipped.dtype == force.dtype else clipped.astype(force.dtype), state
 
-    def remembered(self, state: Memory) -> dict[str, Array]:
+    def internals(self, state: LawState) -> dict[str, Array]:
         """What the memory holds of the law's inside, by name: sigma, s, beta, c, ..., as far as it has them."""
         return flatten(state)
 
-    def diagnostics(self, state: Memory) -> dict[str, Array]:
+    def diagnostics(self, state: LawState) -> dict[str, Array]:
         """What is remembered and what follows from it, for those who look on."""
-        return self.remembered(state)
+        return self.internals(state)
 
-    def upcoming(self, state: Memory, signals: Any) -> dict[str, Array]:
+    def preview(self, state: LawState, signals: Any) -> dict[str, Array]:
         """What the next step is about to see, by name, where the observation alone does not tell it."""
         del state, signals
         return {}
 
 
 class TrackingPolicy(Policy):
-    """A law on the joints' `Signals`, each a field of the observation."""
+    """A law on the joints' `JointInput`, each a field of the observation."""
 
-    def __init__(self, name: str, plant: Plant, gains: Any) -> None:
-        super().__init__(name, plant, gains)
-        self._parts = [(..., plant.observation[field]) for field in Signals._fields]
+    def __init__(self, name: str, interface: ControlInterface, gains: Any) -> None:
+        super().__init__(name, interface, gains)
+        self._parts = [(..., interface.observation[field]) for field in JointInput._fields]
 
-    def read(self, observation: Array) -> Signals:
-        return Signals(*[observation[part] for part in self._parts])
+    def read(self, observation: Array) -> JointInput:
+        return JointInput(*[observation[part] for part in self._parts])
 
-    def accelerated(self, signals: Signals, du: Array) -> Signals:
+    def with_residual(self, signals: JointInput, du: Array) -> JointInput:
         return signals._replace(qdd_ref=signals.qdd_ref + du)
 
 
-def choose(mask: NDArray[np.bool_], fresh: Array | Memory, kept: Array | Memory) -> Any:
+def choose(mask: NDArray[np.bool_], fresh: Array | LawState, kept: Array | LawState) -> Any:
     """Nested tuples of arrays: `fresh` where the mask is true, `kept` elsewhere; the mask covers leading axes."""
     if isinstance(fresh, tuple):
         merged = [choose(mask, *pair) for pair in zip(fresh, kept, strict=True)]
@@ -145,10 +145,10 @@ def choose(mask: NDArray[np.bool_], fresh: Array | Memory, kept: Array | Memory)
     return np.where(mask.reshape(mask.shape + (1,) * (old.ndim - mask.ndim)), new, old)
 
 
-def flatten(memory: Any) -> dict[str, Array]:
+def flatten(state: Any) -> dict[str, Array]:
     """All arrays in nested named tuples by their names."""
     named: dict[str, Array] = {}
-    for name, value in memory._asdict().items():
+    for name, value in state._asdict().items():
         if isinstance(value, tuple):
             named.update(flatten(value))
         else:

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from controllers.law_table import LAWS, Entry
-from controllers.laws.cascade import CascadeGains, CascadeMemory, Flight, attitude_errors, cascade, cascade_start
-from controllers.laws.tracking import Array, Memory
+from controllers.laws.cascade import CascadeGains, CascadeState, QuadrotorInput, attitude_errors, cascade, cascade_init
+from controllers.laws.tracking import Array, LawState
 from controllers.laws.vectors import Axes, joined
-from controllers.policies import Plant, Policy, flatten
+from controllers.policies import ControlInterface, Policy, flatten
 from controllers.presets import LOOPS, preset_gains
 
 AXES = 3  # of a position, and of an attitude
@@ -22,29 +22,29 @@ class QuadrotorPolicy(Policy):
 
     Args:
         name: of the law.
-        plant: a quadrotor's environment.
+        interface: a quadrotor's environment.
         gains: of the cascade.
         laws: of the position and the attitude; None for those that belong to the name.
     """
 
     def __init__(
-        self, name: str, plant: Plant, gains: CascadeGains, *, laws: tuple[Entry, Entry] | None = None
+        self, name: str, interface: ControlInterface, gains: CascadeGains, *, laws: tuple[Entry, Entry] | None = None
     ) -> None:
         (self._position, position), (self._attitude, attitude) = LOOP_LAWS[name] if laws is None else laws
-        period = plant.control_period
+        period = interface.control_period
         own = {"position": position(gains.position, period), "attitude": attitude(gains.attitude, period)}
-        super().__init__(name, plant, dataclasses.replace(gains, **own))
+        super().__init__(name, interface, dataclasses.replace(gains, **own))
         self._period = period
-        self._at = plant.observation.slices
+        self._at = interface.observation.slices
 
-    def read(self, observation: Array) -> Flight:
+    def read(self, observation: Array) -> QuadrotorInput:
         last = observation.ndim - 1
         columns = np.ascontiguousarray(observation.transpose(last, *range(last)))
         rows = columns.transpose(*range(1, last + 1), 0)
         at = self._at
         rotation, wrench = columns[at["rot_body_to_world"]], columns[at["wrench_applied"]]
         x, y, z = ((rotation[i], rotation[3 + i], rotation[6 + i]) for i in range(3))
-        return Flight(
+        return QuadrotorInput(
             position=rows[..., at["position"]],
             velocity=rows[..., at["velocity"]],
             axes=(x, y, z),
@@ -59,29 +59,29 @@ class QuadrotorPolicy(Policy):
             torque_applied=rows[..., at["wrench_applied"]][..., 1:],
         )
 
-    def accelerated(self, signals: Flight, du: Array) -> Flight:
+    def with_residual(self, signals: QuadrotorInput, du: Array) -> QuadrotorInput:
         """Of the position, and of the attitude if `du` (..., 6) goes on with it (rad/s^2, body axes)."""
         position = signals.acceleration_ref + du[..., :AXES]
         return signals._replace(acceleration_ref=position, turning_ref=du[..., AXES:] if du.shape[-1] > AXES else None)
 
-    def upcoming(self, state: Any, signals: Flight) -> dict[str, Array]:
+    def preview(self, state: Any, signals: QuadrotorInput) -> dict[str, Array]:
         """`e_q` and `e_w`, the errors of the attitude loop (rad, rad/s, body axes)."""
         e_q, e_w = attitude_errors(self.gains, state, signals)
         return {"e_q": e_q, "e_w": e_w}
 
-    def start(self, signals: Flight) -> Memory:
-        return cascade_start(self._position, self._attitude, self.gains, signals, self._period)
+    def start(self, signals: QuadrotorInput) -> LawState:
+        return cascade_init(self._position, self._attitude, self.gains, signals, self._period)
 
-    def step(self, memory: Any, signals: Flight, observation: Array) -> tuple[Array, Memory]:
-        return cascade(self._position, self._attitude, self.gains, memory, signals, self._period)
+    def step(self, state: Any, signals: QuadrotorInput, observation: Array) -> tuple[Array, LawState]:
+        return cascade(self._position, self._attitude, self.gains, state, signals, self._period)
 
-    def remembered(self, state: Any) -> dict[str, Array]:
+    def internals(self, state: Any) -> dict[str, Array]:
         """What the memory holds of the inside.
 
         Of each loop what its law has (sigma, s, beta, c, ...), by name with the suffix `_p` (position) or `_q`
         (attitude); `force_command` (..., 3), tau_p (N, world axes).
         """
-        memory: CascadeMemory = state
+        memory: CascadeState = state
         named = {
             f"{name}_{suffix}": value
             for loop, suffix in LOOPS.items()
@@ -92,10 +92,10 @@ class QuadrotorPolicy(Policy):
 
     def diagnostics(self, state: Any) -> dict[str, Array]:
         """What is remembered; `attitude_error` (..., 3), desired minus actual roll, pitch and yaw (rad), -pi to pi."""
-        memory: CascadeMemory = state
+        memory: CascadeState = state
         error = _roll_pitch_yaw(memory.axes_ref) - _roll_pitch_yaw(memory.axes)
         wrapped = np.asarray(np.remainder(error + np.pi, 2 * np.pi) - np.pi)
-        return {**self.remembered(state), "attitude_error": wrapped}
+        return {**self.internals(state), "attitude_error": wrapped}
 
 
 def _roll_pitch_yaw(axes: Axes) -> Array:
@@ -126,5 +126,5 @@ def make_quadrotor(env: Any, *, law: str, preset: str | None = None, **gains: An
         UnknownNameError: for a law that the quadrotor does not have, or an unknown preset.
         GainError: for an unknown gain or a value that is not allowed.
     """
-    plant = Plant.of(env)
-    return QuadrotorPolicy(law, plant, preset_gains(plant.robot, law, preset, AXES, gains))
+    interface = ControlInterface.of(env)
+    return QuadrotorPolicy(law, interface, preset_gains(interface.robot, law, preset, AXES, gains))

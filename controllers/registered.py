@@ -8,7 +8,7 @@ from artde_gym.registration import ControllerSpec
 
 
 def _law(name: str, text: str, **kwargs: Any) -> ControllerSpec:
-    return ControllerSpec(name, "controllers.robots:make_for_robot", kwargs, text, "controllers.robots:search_space")
+    return ControllerSpec(name, "controllers.robots:make_for_robot", kwargs, text, "controllers.robots:tuning_space")
 
 
 CONTROLLERS = (
@@ -40,6 +40,6 @@ CONTROLLERS = (
         "controllers.model_based:make_computed_torque",
         {},
         "biped: feedback linearisation with the nominal model (upper reference)",
-        "controllers.model_based:search_space",
+        "controllers.model_based:tuning_space",
     ),
 )

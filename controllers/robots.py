@@ -7,7 +7,7 @@ from typing import Any
 from artde_gym.registration import GainRange
 from controllers.drive import DRIVES
 from controllers.joint_space import make_joint_space
-from controllers.policies import Plant, Policy
+from controllers.policies import ControlInterface, Policy
 from controllers.presets import gain_ranges
 
 
@@ -24,15 +24,15 @@ def make_for_robot(env: Any, *, law: str, **options: Any) -> Policy:
         UnknownNameError: for a law that the robot does not have, or an unknown preset.
         GainError: for an unknown gain or a value that is not allowed.
     """
-    robot = Plant.of(env).robot
+    robot = ControlInterface.of(env).robot
     make = DRIVES[robot].make if robot in DRIVES else None
     return (make or make_joint_space)(env, law=law, **options)
 
 
-def search_space(env: Any, *, law: str, preset: str | None = None) -> dict[str, GainRange]:
+def tuning_space(env: Any, *, law: str, preset: str | None = None) -> dict[str, GainRange]:
     """Where tuning may look for the gains of a law for the robot of an environment.
 
     Raises:
         UnknownNameError: for a law or preset that the robot does not have, or a law whose gains nobody tunes.
     """
-    return gain_ranges(Plant.of(env).robot, law, preset)
+    return gain_ranges(ControlInterface.of(env).robot, law, preset)

@@ -8,11 +8,11 @@ import numpy as np
 
 from artde_gym.errors import OptionError
 from controllers.law_table import Entry
-from controllers.laws.cascade import CascadeGains, Flight, cascade
+from controllers.laws.cascade import CascadeGains, QuadrotorInput, cascade
 from controllers.laws.load import LoadGains, load_control, load_start
 from controllers.laws.swing import Cable, swing_term
-from controllers.laws.tracking import Array, Law, Memory, Signals
-from controllers.policies import Plant
+from controllers.laws.tracking import Array, JointInput, Law, LawState
+from controllers.policies import ControlInterface
 from controllers.presets import preset_gains
 from controllers.quadrotor import AXES, LOOP_LAWS, QuadrotorPolicy, make_quadrotor
 
@@ -27,11 +27,13 @@ class SlungPolicy(QuadrotorPolicy):
         OptionError: for an environment that has none.
     """
 
-    def __init__(self, name: str, plant: Plant, gains: CascadeGains, *, laws: tuple[Entry, Entry]) -> None:
-        if "cable" not in plant.observation.slices:
-            raise OptionError(f"observation of the environment of {name!r}", list(plant.observation.slices),
+    def __init__(
+        self, name: str, interface: ControlInterface, gains: CascadeGains, *, laws: tuple[Entry, Entry]
+    ) -> None:
+        if "cable" not in interface.observation.slices:
+            raise OptionError(f"observation of the environment of {name!r}", list(interface.observation.slices),
                               "with a cable, as that of QuadSling-Payload-v0")  # fmt: skip
-        super().__init__(name, plant, gains, laws=laws)
+        super().__init__(name, interface, gains, laws=laws)
 
     def cable(self, observation: Array) -> Cable:
         """The cable in an observation."""
@@ -42,33 +44,33 @@ class SlungPolicy(QuadrotorPolicy):
 class SwingPolicy(SlungPolicy):
     """Any law of the position with the swing term; where nothing hangs, the law alone."""
 
-    def read(self, observation: Array) -> Flight:
+    def read(self, observation: Array) -> QuadrotorInput:
         flight, own = super().read(observation), self.gains.position
         du = swing_term(own.k_p, own.k_d, self.cable(observation), flight.acceleration_ref, flight.jerk_ref)
-        return self.accelerated(flight, du)
+        return self.with_residual(flight, du)
 
 
 class LoadPolicy(SlungPolicy):
     """Geometric control of the load above a time-delay attitude; where nothing hangs, PID of the position."""
 
-    def step(self, memory: Any, signals: Flight, observation: Array) -> tuple[Array, Memory]:
+    def step(self, state: Any, signals: QuadrotorInput, observation: Array) -> tuple[Array, LawState]:
         cable = self.cable(observation)
 
-        def position(gains: LoadGains, own: Any, tracked: Signals, period: float) -> tuple[Array, Memory]:
+        def position(gains: LoadGains, own: Any, tracked: JointInput, period: float) -> tuple[Array, LawState]:
             return load_control(gains, own, tracked, cable, period)
 
         law = Law(self._position.start, position)
-        return cascade(law, self._attitude, self.gains, memory, signals, self._period)
+        return cascade(law, self._attitude, self.gains, state, signals, self._period)
 
 
-def _load_start(gains: LoadGains, signals: Signals, _period: float) -> Memory:
+def _load_start(gains: LoadGains, signals: JointInput, _period: float) -> LawState:
     return load_start(gains, signals)
 
 
-def _no_load(gains: LoadGains, memory: Any, signals: Signals, period: float) -> tuple[Array, Memory]:
+def _no_load(gains: LoadGains, state: Any, signals: JointInput, period: float) -> tuple[Array, LawState]:
     """The law where nothing hangs."""
     still = np.zeros_like(signals.q)
-    return load_control(gains, memory, signals, Cable(still, still, np.zeros(still.shape[:-1], np.bool_)), period)
+    return load_control(gains, state, signals, Cable(still, still, np.zeros(still.shape[:-1], np.bool_)), period)
 
 
 def _same(gains: LoadGains, _period: float) -> LoadGains:
@@ -94,8 +96,8 @@ def make_quadrotor_or_slung(env: Any, *, law: str, preset: str | None = None, **
     """
     if law in LOOP_LAWS:
         return make_quadrotor(env, law=law, preset=preset, **gains)
-    plant = Plant.of(env)
-    own = preset_gains(plant.robot, law, preset, AXES, gains)
+    interface = ControlInterface.of(env)
+    own = preset_gains(interface.robot, law, preset, AXES, gains)
     if law.endswith(SWING):
-        return SwingPolicy(law, plant, own, laws=LOOP_LAWS[law.removesuffix(SWING)])
-    return LoadPolicy(law, plant, own, laws=(LOAD_LAW, LOOP_LAWS["tde"][1]))
+        return SwingPolicy(law, interface, own, laws=LOOP_LAWS[law.removesuffix(SWING)])
+    return LoadPolicy(law, interface, own, laws=(LOAD_LAW, LOOP_LAWS["tde"][1]))

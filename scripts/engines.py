@@ -74,7 +74,7 @@ def both(scenario: str, options: argparse.Namespace, **kwargs: Any) -> dict[str,
             episodes=options.episodes,
             workers=options.workers,
             env_kwargs={**kwargs, "engine": engine},
-            backend="batch" if engine == "mujoco" else "single",  # the same episodes, faster
+            vectorized=engine == "mujoco",  # the same episodes, faster
         )
         for engine in ENGINES
     }

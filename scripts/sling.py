@@ -20,8 +20,8 @@ import pandas as pd
 
 import controllers
 from artde_gym.evaluation import statistics
-from artde_gym.evaluation.batch import run_batch
 from artde_gym.evaluation.seeds import episode_seed
+from artde_gym.evaluation.vector_rollout import run_vector
 from artde_gym.robots.q450.kit import kick
 from artde_gym.scenarios import SCENARIOS
 
@@ -116,7 +116,7 @@ def flights(
             policies += [(controllers.make(name, env.unwrapped, load_mass_p=mass, **gains), seeds) for mass, _ in cells]
         else:
             policies.append((controllers.make(name, env.unwrapped, **gains), seeds * len(cells)))
-    return pd.DataFrame([episode.row for episode in run_batch(env, Together(policies), numbers)])
+    return pd.DataFrame([episode.row for episode in run_vector(env, Together(policies), numbers)])
 
 
 class Together:

@@ -37,7 +37,7 @@ def can_run(marker: str) -> bool:
         return sys.platform == "linux"
     try:
         for name in NEEDS[marker]:
-            importlib.import_module("artde_gym.sim.quiet" if name == "pybullet" else name)
+            importlib.import_module("artde_gym.sim.pybullet_module" if name == "pybullet" else name)
     except ImportError:
         return False
     return True

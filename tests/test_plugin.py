@@ -38,7 +38,7 @@ if commands:
 """
 DOCTOR = """
 import artde_gym.doctor.environments as checks
-from controllers.checkup import validity
+from controllers.stability_check import validity
 checks.ours = lambda: ["TwoLinkArm-Swing-v0"]
 from artde_gym.sim.factory import ENGINES
 engines = [lambda name=name: checks.in_engine(name) for name in ENGINES]
@@ -70,7 +70,7 @@ AGENT = """
 import numpy as np
 import gymnasium as gym
 import controllers
-from baselines.recipe import Recipe
+from baselines.residual_config import Recipe
 from baselines.residual_env import ResidualEnv
 env, plain = (gym.make("TwoLinkArm-Swing-v0", duration=0.2) for _ in range(2))
 agent, policy = ResidualEnv(env, Recipe("two-link-arm")), controllers.make("tde", plain)

@@ -16,7 +16,7 @@ from artde_gym.benchmark.timing import resident
 from artde_gym.evaluation.rollout import run_episode
 from artde_gym.registration import make_controller
 from artde_gym.scenarios import SCENARIOS
-from artde_gym.sim.bare import open_clients
+from artde_gym.sim.engine_loops import open_clients
 
 GROWTH = 10.0  # MB, at most
 DRIFT = 0.9

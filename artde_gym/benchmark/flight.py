@@ -8,7 +8,7 @@ from artde_gym.arrays import Array
 from artde_gym.benchmark.environments import ENGINES, fleet, quadrotor
 from artde_gym.benchmark.figure import Figure, Section
 from artde_gym.benchmark.timing import TURN, ClosedLoop, Replay, in_turns
-from artde_gym.sim.bare import body_loop
+from artde_gym.sim.engine_loops import body_loop
 
 PERIODS = 2000  # of 15 ms: half a minute of flight
 PHYSICS_STEPS = 15  # a period

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from artde_gym.benchmark.figure import Section
-from artde_gym.errors import UnknownNameError, among
+from artde_gym.errors import UnknownNameError, suggest_names
 from artde_gym.registration import resolved
 from artde_gym.registry import pointed
 
@@ -13,7 +13,7 @@ SECTIONS: dict[str, str] = {
     "walk": "artde_gym.benchmark.walk:walking",
     "flight": "artde_gym.benchmark.flight:flying",
     "fleet": "artde_gym.benchmark.flight:fleets",
-    "herd": "artde_gym.benchmark.herd:herds",
+    "biped-vector": "artde_gym.benchmark.biped_vector:biped_vector",
     "reset": "artde_gym.benchmark.reset:resetting",
     "controllers": "artde_gym.benchmark.calls:calling",
     "scaling": "artde_gym.benchmark.scaling:scaling",
@@ -40,7 +40,7 @@ def measure(
     """
     for name in names or ():
         if name not in SECTIONS:
-            raise UnknownNameError("section", name, among(name, SECTIONS))
+            raise UnknownNameError("section", name, suggest_names(name, SECTIONS))
     found = {}
     for name in names or SECTIONS:
         if on_section is not None:

@@ -6,7 +6,7 @@ from artde_gym.arrays import Array
 from artde_gym.benchmark.environments import ENGINES, biped
 from artde_gym.benchmark.figure import Figure, Section
 from artde_gym.benchmark.timing import TURN, ClosedLoop, Replay, in_turns
-from artde_gym.sim.bare import joint_loop
+from artde_gym.sim.engine_loops import joint_loop
 
 STEPS = 5900  # two seconds of standing, two steps, standing again
 LEAST = {("bullet", "environment"): 0.85, ("bullet", "artde"): 0.75}

@@ -21,7 +21,7 @@ Controllers = Annotated[str, typer.Option(help="Names, comma-separated; see `lis
 Seed = Annotated[int, typer.Option(help="Seed of everything.")]
 Workers = Annotated[int | None, typer.Option(help="Processes. Default: all cores.")]
 Out = Annotated[Path | None, typer.Option(help="Results folder. Default: runs/<date and time>.")]
-Backend = Annotated[
+Vectorized = Annotated[
     str, typer.Option(help="single: one environment after the other; batch: many at once (of the biped, in MuJoCo).")
 ]
 Engine = Annotated[str | None, typer.Option(help=f"Physics engine: {' or '.join(ENGINES)}. Default: see `doctor`.")]

@@ -10,7 +10,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from artde_gym.disturbances import KINDS
+from artde_gym.disturbances import DISTURBANCES
 from artde_gym.disturbances.kinds import ALL, allowed, other_defaults
 from artde_gym.evaluation.environments import arguments_of, ours, robot_of
 from artde_gym.kit import ROBOTS
@@ -101,11 +101,11 @@ def disturbances() -> Entries:
             "name": kind.name,
             "text": kind.text,
             "robots": [robot for robot in ROBOTS if kind.honored_by(robot)],
-            "list": kind.repeated,
-            "bare_number": kind.scalar,
-            "words": {
+            "list": kind.multiple,
+            "bare_number": kind.shorthand,
+            "choices": {
                 robot: {
-                    parameter.name: _words(parameter.words, robot)
+                    parameter.name: _words(parameter.choices, robot)
                     for parameter in kind.parameters
                     if parameter.size == 0
                 }
@@ -128,7 +128,7 @@ def disturbances() -> Entries:
                 for parameter in kind.parameters
             ],
         }
-        for kind in KINDS.values()
+        for kind in DISTURBANCES.values()
     ]
 
 

@@ -12,12 +12,12 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from artde_gym.arguments import number
+from artde_gym.arguments import check_number
 from artde_gym.cli.arguments import json_object
 from artde_gym.errors import OptionError
 from artde_gym.evaluation.store import write_atomically
 from artde_gym.kit import ROBOTS
-from artde_gym.palette import LOOKS
+from artde_gym.palette import STYLES
 from artde_gym.report.chart import Axis, Chart
 from controllers.design import DELAYED, Design, designed
 from controllers.design import design as work_out
@@ -45,7 +45,7 @@ def design(
     if robot not in NAMES:
         raise OptionError("robot", robot, ", ".join(map(repr, NAMES)))
     if period is not None:
-        number("period", period, 1e-6, 10.0, "1e-6 to 10 s")
+        check_number("period", period, 1e-6, 10.0, "1e-6 to 10 s")
     walk = {"actuator_inertia": actuator_inertia, "speed": speed, "step_duration": step_duration}
     given = {name: value for name, value in walk.items() if value is not None} | json_object("--motion", motion)
     found = work_out(NAMES[robot], law, preset, period, gains=json_object("gains", gains), **given)
@@ -69,10 +69,10 @@ def draw(one: Design) -> str:
     x = Axis("time (s)", 0.0, 1.0 if still else float(time[-1]))
     y = Axis.of(f"m_bar ({unit})", one.limit, one.m_bar, zero=True)
     chart = Chart(f"Largest valid m_bar of the {one.loop.name} along the reference", x, y, 480, 280)
-    chart.line([0.0, 1.0] if still else time, np.repeat(one.limit, 2) if still else one.limit, LOOKS["tde"])
-    chart.level(one.largest, f"valid below {one.largest:.4g}", LOOKS["tde"])
+    chart.line([0.0, 1.0] if still else time, np.repeat(one.limit, 2) if still else one.limit, STYLES["tde"])
+    chart.level(one.largest, f"valid below {one.largest:.4g}", STYLES["tde"])
     for chosen in sorted(set(one.m_bar.tolist())):
-        chart.level(chosen, f"chosen {chosen:.4g}", LOOKS["artde"])
+        chart.level(chosen, f"chosen {chosen:.4g}", STYLES["artde"])
     return chart.file()
 
 

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from artde_gym.cli.arguments import names
 from artde_gym.cli.display import terminal
-from artde_gym.doctor import CHECKS, Report, examine
+from artde_gym.doctor import CHECKS, Report, run_checks
 
 LOOK = {"ok": ("ok", "green"), "missing": ("--", "yellow"), "failed": ("FAILED", "bold red")}
 
@@ -28,7 +28,7 @@ def doctor(
     console = terminal()
     found: dict[str, Report] = {}
     start = time.monotonic()
-    for name, report in examine(None if checks is None else names(checks)):
+    for name, report in run_checks(None if checks is None else names(checks)):
         found[name] = report
         if not as_json:
             _print(report, console)

@@ -9,7 +9,6 @@ import typer
 from artde_gym.cli.arguments import (
     WALK,
     AllowMixed,
-    Backend,
     Controllers,
     Disturbances,
     Engine,
@@ -19,6 +18,7 @@ from artde_gym.cli.arguments import (
     Pictures,
     Report,
     Seed,
+    Vectorized,
     Videos,
     Workers,
     environment_kwargs,
@@ -48,15 +48,15 @@ def evaluate(
     seed: Seed = 0,
     workers: Workers = None,
     out: Out = None,
-    backend: Backend = "single",
+    vectorized: Vectorized = False,
     engine: Engine = None,
     disturbances: Disturbances = None,
     env_kwargs: EnvKwargs = None,
     gains: Gains = None,
-    traced: Annotated[
+    record_episodes: Annotated[
         int | None, typer.Option(help="Episodes that leave signals. Default: all of them; none in the batch backend.")
     ] = None,
-    trace_hz: Annotated[float, typer.Option(help="Rate of stored signals; inf for all of them.")] = 100.0,
+    record_hz: Annotated[float, typer.Option(help="Rate of stored signals; inf for all of them.")] = 100.0,
     allow_mixed: AllowMixed = False,
     report: Report = False,
     pictures: Pictures = False,
@@ -66,7 +66,7 @@ def evaluate(
     if scenario is None:
         env = env or WALK
         scenario = ",".join(main_scenarios(env)) or None
-        if scenario is not None and backend == "batch":
+        if scenario is not None and vectorized:
             scenario = scenario.split(",")[0]
     kwargs = environment_kwargs(env_kwargs, engine)
     folder = folder_of(out)
@@ -83,9 +83,9 @@ def evaluate(
             disturbances=optional_json("--disturbances", disturbances),
             env_kwargs=kwargs,
             gains=json_object("--gains", gains),
-            backend=backend,  # pyright: ignore[reportArgumentType]  # checked there
-            traced=traced,
-            trace_hz=trace_hz,
+            vectorized=vectorized,  # pyright: ignore[reportArgumentType]  # checked there
+            record_episodes=record_episodes,
+            record_hz=record_hz,
             allow_mixed=allow_mixed,
             on_progress=display,
         )

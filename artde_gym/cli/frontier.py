@@ -8,7 +8,6 @@ import typer
 
 from artde_gym.cli.arguments import (
     AllowMixed,
-    Backend,
     Controllers,
     Disturbances,
     Engine,
@@ -17,6 +16,7 @@ from artde_gym.cli.arguments import (
     Out,
     Report,
     Seed,
+    Vectorized,
     Workers,
     environment_kwargs,
     folder_of,
@@ -52,7 +52,7 @@ def frontier(
     disturbances: Disturbances = None,
     env_kwargs: EnvKwargs = None,
     gains: Gains = None,
-    backend: Backend = "single",
+    vectorized: Vectorized = False,
     allow_mixed: AllowMixed = False,
     report: Report = False,
 ) -> None:
@@ -76,7 +76,7 @@ def frontier(
             disturbances=optional_json("--disturbances", disturbances),
             env_kwargs=kwargs,
             gains=json_object("--gains", gains),
-            backend=backend,  # pyright: ignore[reportArgumentType]  # checked there
+            vectorized=vectorized,  # pyright: ignore[reportArgumentType]  # checked there
             allow_mixed=allow_mixed,
             on_progress=lambda value, update: display(update, f"{vary} {value:g}"),
         )

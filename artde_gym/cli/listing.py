@@ -15,7 +15,7 @@ from rich.text import Text
 from artde_gym.cli.arguments import names
 from artde_gym.cli.catalogue import TOPICS, Entries
 from artde_gym.cli.display import terminal
-from artde_gym.errors import UnknownNameError, among
+from artde_gym.errors import UnknownNameError, suggest_names
 
 Shown = Callable[[Entries, Console], None]
 
@@ -27,7 +27,7 @@ def list_everything(
 ) -> None:
     """Show environments, scenarios, controllers with their gains, disturbances with their schemas, frontiers."""
     if topic is not None and topic not in TOPICS:
-        raise UnknownNameError("topic", topic, among(topic, TOPICS))
+        raise UnknownNameError("topic", topic, suggest_names(topic, TOPICS))
     if name is not None and topic is None:
         raise UnknownNameError("topic", topic, f"{', '.join(TOPICS)}, where names are given")
     found = {one: TOPICS[one]() for one in (TOPICS if topic is None else [topic])}
@@ -47,7 +47,7 @@ def _chosen(entries: Entries, topic: str, wanted: list[str]) -> Entries:
     known = [entry["name"] for entry in entries]
     for name in wanted:
         if name not in known:
-            raise UnknownNameError(f"name in {topic}", name, among(name, known))
+            raise UnknownNameError(f"name in {topic}", name, suggest_names(name, known))
     return [entry for entry in entries if entry["name"] in wanted]
 
 
@@ -136,7 +136,7 @@ def _disturbances_in_full(entries: Entries, console: Console) -> None:
     for entry in entries:
         _head(console, entry["name"] + (" (list)" if entry["list"] else ""), entry["text"])
         _line(console, f"for {', '.join(entry['robots'])}")
-        for robot, words in entry["words"].items():
+        for robot, words in entry["choices"].items():
             for parameter, allowed in words.items():
                 _line(console, f"{parameter} on {robot}: {', '.join(allowed)}")
         table = _table("", "parameter", "default", "allowed", "meaning")

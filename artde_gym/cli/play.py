@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from artde_gym.arguments import whole
+from artde_gym.arguments import check_integer
 from artde_gym.cli.arguments import (
     WALK,
     Disturbances,
@@ -39,7 +39,7 @@ def play(
     from artde_gym.play import HELP, Session
     from artde_gym.sim.window import open_window
 
-    whole("seed", seed, 0)
+    check_integer("seed", seed, 0)
     kwargs, overrides = environment_kwargs(env_kwargs, engine), json_object("--gains", gains)
     (cell,) = cells_of(env, scenario, kwargs, optional_json("--disturbances", disturbances))
     window = open_window()

@@ -23,8 +23,10 @@ def train(
     steps: Annotated[int, typer.Option(help="Decisions of the agent, all environments together.")] = 1_000_000,
     seed: Seed = 0,
     workers: Annotated[int | None, typer.Option(help="Processes of environments. Default: all cores.")] = None,
-    channel: Annotated[str, typer.Option(help="What an action means. Default: the robot's; see the model cards.")] = "",
-    limit: Annotated[float, typer.Option(help="Largest residual. Default: the channel's.")] = 0.0,
+    action_mode: Annotated[
+        str, typer.Option(help="What an action means. Default: the robot's; see the model cards.")
+    ] = "",
+    action_scale: Annotated[float, typer.Option(help="Largest residual. Default: the channel's.")] = 0.0,
     gated: Annotated[bool, typer.Option(help="Fade the biped's residual in by tilt and velocity error.")] = True,
     patience: Annotated[int, typer.Option(help="Held-out tests without a better score that end the run.")] = 20,
     test_every: Annotated[int, typer.Option(help="Intervals (or generations) between two held-out tests.")] = 4,
@@ -34,7 +36,7 @@ def train(
     report: Report = False,
 ) -> None:
     """Train a residual on a controller; killed at any moment, the same command continues from its last checkpoint."""
-    from baselines.recipe import Recipe  # torch is heavy, and may not be installed
+    from baselines.residual_config import ResidualConfig  # torch is heavy, and may not be installed
     from baselines.run import Progress as TrainingProgress
     from baselines.run import Training
     from baselines.tasks import task
@@ -42,7 +44,7 @@ def train(
     kwargs = environment_kwargs(env_kwargs, engine)
     training = Training(
         env,
-        Recipe(task(env).robot, base, channel=channel, limit=limit, gated=gated),
+        ResidualConfig(task(env).robot, base, action_mode=action_mode, action_scale=action_scale, gated=gated),
         algo=algo,
         steps=steps,
         seed=seed,

@@ -9,13 +9,13 @@ import typer
 from artde_gym.cli.arguments import (
     WALK,
     AllowMixed,
-    Backend,
     Controllers,
     Disturbances,
     Engine,
     EnvKwargs,
     Out,
     Seed,
+    Vectorized,
     Workers,
     environment_kwargs,
     folder_of,
@@ -43,7 +43,7 @@ def tune(
     seed: Seed = 0,
     workers: Workers = None,
     out: Out = None,
-    backend: Backend = "single",
+    vectorized: Vectorized = False,
     engine: Engine = None,
     disturbances: Disturbances = None,
     env_kwargs: EnvKwargs = None,
@@ -66,7 +66,7 @@ def tune(
             out=folder_of(out),
             disturbances=optional_json("--disturbances", disturbances),
             env_kwargs=kwargs,
-            backend=backend,  # pyright: ignore[reportArgumentType]  # checked there
+            vectorized=vectorized,  # pyright: ignore[reportArgumentType]  # checked there
             allow_mixed=allow_mixed,
             on_progress=lambda what, update: display(update, what),
         )

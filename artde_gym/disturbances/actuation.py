@@ -16,20 +16,20 @@ class Actuation:
     """Turns commands into acting torques; `start` begins an episode.
 
     Args:
-        realised: drawn disturbances, of which "torque_delay", "actuator_loss" and "motor_lag" matter here.
+        sampled: drawn disturbances, of which "action_delay", "actuator_effectiveness" and "motor_lag" matter here.
         joints: names of the actuated joints, in the order of commands.
         time_step: of the physics (s).
     """
 
-    KINDS = ("torque_delay", "actuator_loss", "motor_lag")
+    KINDS = ("action_delay", "actuator_effectiveness", "motor_lag")
 
-    def __init__(self, realised: Mapping[str, Any], joints: Sequence[str], time_step: float) -> None:
-        self._delay: int = realised.get("torque_delay", {}).get("samples", 0)
-        constant: float = realised.get("motor_lag", {}).get("time_constant", 0.0)
+    def __init__(self, sampled: Mapping[str, Any], joints: Sequence[str], time_step: float) -> None:
+        self._delay: int = sampled.get("action_delay", {}).get("steps", 0)
+        constant: float = sampled.get("motor_lag", {}).get("time_constant", 0.0)
         self._closed, self._closed_mean = lag_shares(constant, time_step)
         self._losses = [
             (joints.index(loss["joint"]), loss["factor"], round(loss["start"] / time_step))
-            for loss in realised.get("actuator_loss", ())
+            for loss in sampled.get("actuator_effectiveness", ())
         ]
         self._late: deque[Array] = deque()
         self._acting = np.zeros(len(joints))

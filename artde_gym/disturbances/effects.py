@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
-from artde_gym.disturbances.kinds import KINDS, Load, RobotStates
+from artde_gym.disturbances.kinds import DISTURBANCES, Load, RobotStates
 from artde_gym.disturbances.numeric import Words, number_of
 from artde_gym.errors import DisturbanceError
 from artde_gym.sim.engine import State, World
@@ -50,8 +50,8 @@ class Effects:
         entries = [
             (name, number, self._numbers(name, entry))
             for name, value in sampled.items()
-            if KINDS[name].effect is not None
-            for number, entry in enumerate(value if KINDS[name].repeated else (value,))
+            if DISTURBANCES[name].effect is not None
+            for number, entry in enumerate(value if DISTURBANCES[name].multiple else (value,))
         ]
         if entries or self._sampled[robot]:
             self._sampled[robot], self._groups = entries, None
@@ -75,7 +75,7 @@ class Effects:
                     total.setdefault(name, np.zeros(shapes[name]))[group.robots] += part
         return Load(**total)
 
-    def act(self, world: World, state: State, time: float) -> Array | float:
+    def apply(self, world: World, state: State, time: float) -> Array | float:
         """Load the base of the only robot for a physics step; returns torques (joints,) (Nm) to be added, or 0."""
         load = self.load_of(state, time)
         load_base(world, load, 0)
@@ -88,7 +88,7 @@ class Effects:
         return self.load(RobotStates(*(np.array([part]) for part in (time, *state))))
 
     def _numbers(self, kind: str, entry: Mapping[str, Any]) -> Numbers:
-        parameters = [parameter for parameter in KINDS[kind].parameters if parameter.name in entry]
+        parameters = [parameter for parameter in DISTURBANCES[kind].parameters if parameter.name in entry]
         return {p.name: number_of(p, entry[p.name], self._words) for p in parameters}
 
     def _grouped(self) -> list[_Group]:
@@ -106,7 +106,7 @@ class Effects:
 
 
 def _load_of(group: _Group, some: RobotStates) -> Load:
-    effect: Any = KINDS[group.kind].effect
+    effect: Any = DISTURBANCES[group.kind].effect
     load = effect(group.values, some)
     if not isinstance(load, Load):
         raise DisturbanceError(f"effect of {group.kind!r}", load, "a Load")
@@ -118,7 +118,7 @@ def load_base(world: World, load: Load, robot: int) -> None:
     if load.force is not None or load.torque is not None:
         parts = (_NOTHING if part is None else part[robot].tolist() for part in (load.force, load.torque))
         (fx, fy, fz), (x, y, z) = parts
-        world.load_base((fx, fy, fz), (x, y, z))
+        world.apply_world_wrench((fx, fy, fz), (x, y, z))
 
 
 def _check_shape(group: _Group, name: str, part: Any, size: tuple[int, ...]) -> None:

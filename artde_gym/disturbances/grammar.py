@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from artde_gym.disturbances.kinds import ALL, KINDS, NEVER, Kind, Parameter, allowed, in_order
-from artde_gym.errors import DisturbanceError, among
+from artde_gym.disturbances.kinds import ALL, DISTURBANCES, NEVER, DisturbanceSpec, Parameter, allowed, in_order
+from artde_gym.errors import DisturbanceError, suggest_names
 from artde_gym.kit import PAYLOAD
 
 DISTRIBUTIONS = ("uniform", "normal", "choice")
@@ -53,18 +53,18 @@ class Disturbances:
             robot: one of `artde_gym.kit.ROBOTS`, for its kinds and defaults; without, any kind is read.
 
         Raises:
-            DisturbanceError: for an unknown kind, key or site, a kind that the robot does not honour, a wrong type, a
+            DisturbanceError: for an unknown kind, key or site, a kind that the robot does not honor, a wrong type, a
                 value out of range or not finite.
         """
         if given is None:
             return cls()
         if not isinstance(given, Mapping):
             raise DisturbanceError("disturbances", given, "a mapping of kinds to their parameters")
-        honoured = [kind.name for kind in KINDS.values() if kind.honored_by(robot)]
+        honored = [kind.name for kind in DISTURBANCES.values() if kind.honored_by(robot)]
         for name in given:
-            if name not in honoured:
-                of_robot = f"{robot} honours " if name in KINDS else ""
-                raise DisturbanceError("disturbances", name, of_robot + among(name, honoured))
+            if name not in honored:
+                of_robot = f"{robot} honors " if name in DISTURBANCES else ""
+                raise DisturbanceError("disturbances", name, of_robot + suggest_names(name, honored))
         entries: list[tuple[str, Mapping[str, Any]]] = []
         for kind in in_order():
             if (name := kind.name) in given:
@@ -74,20 +74,20 @@ class Disturbances:
         _require_load(entries)
         return cls(tuple(entries))
 
-    def draw(self, rng: np.random.Generator) -> dict[str, Any]:
-        """Realised values, in the same grammar: `Disturbances.parse` reads them back."""
-        realised: dict[str, Any] = {}
+    def sample(self, rng: np.random.Generator) -> dict[str, Any]:
+        """Sampled values, in the same grammar: `Disturbances.parse` reads them back."""
+        sampled: dict[str, Any] = {}
         for name, entry in self.entries:
             values = {
                 parameter.name: _draw(entry[parameter.name], parameter, rng)
-                for parameter in KINDS[name].parameters
+                for parameter in DISTURBANCES[name].parameters
                 if parameter.name in entry
             }
-            if KINDS[name].repeated:
-                realised.setdefault(name, []).append(values)
+            if DISTURBANCES[name].multiple:
+                sampled.setdefault(name, []).append(values)
             else:
-                realised[name] = values
-        return realised
+                sampled[name] = values
+        return sampled
 
     def idle(self, duration: float) -> list[str]:
         """Tell which kinds can never happen in an episode of `duration` seconds, and why."""
@@ -100,7 +100,7 @@ class Disturbances:
         """The disturbances as JSON that `parse` reads back."""
         grouped: dict[str, Any] = {}
         for name, entry in self.entries:
-            if KINDS[name].repeated:
+            if DISTURBANCES[name].multiple:
                 grouped.setdefault(name, []).append(dict(entry))
             else:
                 grouped[name] = dict(entry)
@@ -117,11 +117,11 @@ def _require_load(entries: Sequence[tuple[str, Mapping[str, Any]]]) -> None:
 
 def _idle(entry: Mapping[str, Any], duration: float) -> str:
     """Say why an entry can never happen; "" if it can."""
-    begin = min(_range(entry.get("start", entry.get("attach", 0.0))))
+    begin = min(_range(entry.get("start", entry.get("attach_time", 0.0))))
     if begin >= duration:
         return f"begins at {begin:g} s and the episode ends at {duration:g} s"
-    if "drop" in entry and max(_range(entry["drop"])) <= begin:
-        return f"ends at {max(_range(entry['drop'])):g} s and begins at {begin:g} s"
+    if "detach_time" in entry and max(_range(entry["detach_time"])) <= begin:
+        return f"ends at {max(_range(entry['detach_time'])):g} s and begins at {begin:g} s"
     return ""
 
 
@@ -133,8 +133,8 @@ def _range(value: Any) -> list[float]:
     return [0.0, NEVER] if kind == "normal" else arguments
 
 
-def _entries(kind: Kind, given: Any) -> list[tuple[str, Any]]:
-    if not kind.repeated:
+def _entries(kind: DisturbanceSpec, given: Any) -> list[tuple[str, Any]]:
+    if not kind.multiple:
         return [(kind.name, given)]
     if isinstance(given, Mapping):
         return [(f"{kind.name}[0]", given)]
@@ -149,16 +149,16 @@ def _each_joint(entry: dict[str, Any], joints: Collection[str]) -> list[dict[str
 
 
 def _parse_entry(
-    kind: Kind, given: Any, path: str, words: Mapping[str, Collection[str]], robot: str | None
+    kind: DisturbanceSpec, given: Any, path: str, words: Mapping[str, Collection[str]], robot: str | None
 ) -> dict[str, Any]:
     names = {parameter.name: parameter for parameter in kind.parameters_for(robot)}
-    if kind.scalar is not None and (_is_number(given) or _is_distribution(given)):
-        given = {kind.scalar: given}
+    if kind.shorthand is not None and (_is_number(given) or _is_distribution(given)):
+        given = {kind.shorthand: given}
     if not isinstance(given, Mapping):
         raise DisturbanceError(path, given, f"a mapping with keys among {', '.join(names)}")
     for key in given:
         if key not in names:
-            raise DisturbanceError(f"{path} key", key, among(key, names))
+            raise DisturbanceError(f"{path} key", key, suggest_names(key, names))
     chosen = [name for name in kind.one_of if name in given]
     if kind.one_of and len(chosen) != 1:
         raise DisturbanceError(path, dict(given), f"exactly one of {', '.join(kind.one_of)}")
@@ -175,9 +175,9 @@ def _parse_entry(
 
 
 def _word(value: Any, parameter: Parameter, field: str, words: Mapping[str, Collection[str]]) -> str:
-    known = words[parameter.words] if isinstance(parameter.words, str) else parameter.words
+    known = words[parameter.choices] if isinstance(parameter.choices, str) else parameter.choices
     if not (isinstance(value, str) and value in known):
-        raise DisturbanceError(field, value, among(value, known))
+        raise DisturbanceError(field, value, suggest_names(value, known))
     return value
 
 

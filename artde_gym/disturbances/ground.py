@@ -48,7 +48,7 @@ class GrfPulses:
         self._since = np.zeros((n, 2), np.int64)  # steps
 
     def begin(self, robot: int, entry: Mapping[str, Any] | None, spec: RobotSpec) -> None:
-        """Start an episode of a robot with a realised disturbance, or without one; a share is one of its weight."""
+        """Start an episode of a robot with a sampled disturbance, or without one; a share is one of its weight."""
         wave = np.zeros(1) if entry is None else _wave(entry, spec.mass * GRAVITY, self._time_step)
         longer = len(wave) - self._waves.shape[1]
         if longer > 0:

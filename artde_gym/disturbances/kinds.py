@@ -68,7 +68,7 @@ class Parameter:
         size: number of components; 0 for a word.
         nonzero: whether a vector of zeros is refused.
         integer: whether the value is a whole number.
-        words: allowed words, or "site" or "joint" for the names that the robot has; rotors count as joints.
+        choices: allowed words, or "site" or "joint" for the names that the robot has; rotors count as joints.
         requires: the capability without which a robot does not know this parameter; None if the kind's own is enough.
         with_other: another parameter, and the default where that one is given and not zero.
     """
@@ -82,19 +82,19 @@ class Parameter:
     size: int = 1
     nonzero: bool = False
     integer: bool = False
-    words: tuple[str, ...] | str = ()
+    choices: tuple[str, ...] | str = ()
     requires: Capability | None = None
     with_other: tuple[str, Any] | None = None
 
 
 @dataclasses.dataclass(frozen=True)
-class Kind:
+class DisturbanceSpec:
     """A disturbance by name.
 
     Attributes:
         requires: the capability of a robot that it takes.
-        scalar: the parameter that a bare number stands for.
-        repeated: whether it takes a list of entries. Where it names a joint, "all" stands for one entry a joint.
+        shorthand: the parameter that a bare number stands for.
+        multiple: whether it takes a list of entries. Where it names a joint, "all" stands for one entry a joint.
         one_of: parameters of which exactly one is given; the others are absent.
         effect: of a registered kind; environments act by themselves on those of this project.
     """
@@ -103,8 +103,8 @@ class Kind:
     text: str
     parameters: tuple[Parameter, ...]
     requires: Capability
-    scalar: str | None = None
-    repeated: bool = False
+    shorthand: str | None = None
+    multiple: bool = False
     one_of: tuple[str, ...] = ()
     effect: Effect | None = None
 
@@ -139,17 +139,17 @@ TRIGGERS = ("contact", "plan")
 
 
 def _word(name: str, words: tuple[str, ...] | str, default: str | None, text: str) -> Parameter:
-    return Parameter(name, "", 0, 0, default, text, size=0, words=words)
+    return Parameter(name, "", 0, 0, default, text, size=0, choices=words)
 
 
 def _time(name: str, default: float | None, text: str) -> Parameter:
     return Parameter(name, "s", 0.0, NEVER, default, text)
 
 
-OWN: dict[str, Kind] = {
+OWN: dict[str, DisturbanceSpec] = {
     kind.name: kind
     for kind in (
-        Kind(
+        DisturbanceSpec(
             "payload",
             "A ball fixed to the base, or hanging under it on a cable, which neither stretches nor weighs anything and "
             "goes slack; see `artde_gym.sim.cable`. While it is there, the site `payload` is where it can be pushed.",
@@ -161,20 +161,20 @@ OWN: dict[str, Kind] = {
                     -0.5,
                     0.5,
                     (0.0, 0.0, 0.16),
-                    "its centre in the base frame; with a cable, the hook's place",
+                    "its center in the base frame; with a cable, the hook's place",
                     size=3,
                     with_other=("cable", HOOK),
                 ),
-                _time("attach", 0.0, "from when; at 0 the episode starts in balance with it"),
-                _time("drop", NEVER, "until when; not after `attach`, it never appears"),
+                _time("attach_time", 0.0, "from when; at 0 the episode starts in balance with it"),
+                _time("detach_time", NEVER, "until when; not after `attach_time`, it never appears"),
                 Parameter(
                     "cable", "m", 0.0, 2.0, 0.0, "length of the cable; 0 for a ball that is fixed", requires="cable"
                 ),
             ),
-            scalar="mass",
+            shorthand="mass",
             requires="payload",
         ),
-        Kind(
+        DisturbanceSpec(
             "push",
             "A constant force for a while, in world axes.",
             (
@@ -194,10 +194,10 @@ OWN: dict[str, Kind] = {
                 _time("start", None, "first instant"),
                 Parameter("duration", "s", 1e-3, 60.0, 0.2, "how long"),
             ),
-            repeated=True,
+            multiple=True,
             requires="sites",
         ),
-        Kind(
+        DisturbanceSpec(
             "grf_pulse",
             "An extra upward force on the foot that lands, through its center of mass, one pulse a landing: the ground "
             "reaction model of the thesis. The engine has contact forces of its own, so this counts them twice; off by "
@@ -216,28 +216,28 @@ OWN: dict[str, Kind] = {
                     "instant at which the plan puts load on it again",
                 ),
             ),
-            scalar="magnitude",
+            shorthand="magnitude",
             one_of=("magnitude", "share"),
             requires="feet",
         ),
-        Kind(
+        DisturbanceSpec(
             "friction",
             "Friction coefficient of the pair foot and ground.",
             (Parameter("coefficient", "1", 0.01, 2.0, None, "instead of the nominal 0.8"),),
-            scalar="coefficient",
+            shorthand="coefficient",
             requires="feet",
         ),
-        Kind(
+        DisturbanceSpec(
             "slope",
             "A slope; gravity is tilted, so that heights and angles are measured from the ground.",
             (
                 Parameter("pitch_deg", "deg", -20.0, 20.0, 0.0, "above zero the ground rises ahead"),
                 Parameter("roll_deg", "deg", -20.0, 20.0, 0.0, "above zero the ground rises to the left"),
             ),
-            scalar="pitch_deg",
+            shorthand="pitch_deg",
             requires="feet",
         ),
-        Kind(
+        DisturbanceSpec(
             "wind",
             "Moving air: a steady wind, ambient air that wanders (an Ornstein-Uhlenbeck process in each direction, "
             "calm at the start), and the jet of a fan (Gaussian across its axis, its speed fluctuating likewise). It "
@@ -248,7 +248,7 @@ OWN: dict[str, Kind] = {
                 Parameter("ambient", "m/s", 0.0, 10.0, 0.5, "standard deviation of each component of the ambient air"),
                 Parameter("ambient_time", "s", 0.01, 100.0, 1.0, "its correlation time"),
                 Parameter("fan_speed", "m/s", 0.0, 20.0, 4.0, "mean speed on the jet's axis; 0 for no fan"),
-                Parameter("fan_place", "m", -10.0, 10.0, (0.9, 0.0, 0.7), "a point on the jet's axis", size=3),
+                Parameter("fan_position", "m", -10.0, 10.0, (0.9, 0.0, 0.7), "a point on the jet's axis", size=3),
                 Parameter(
                     "fan_direction",
                     "1",
@@ -265,17 +265,17 @@ OWN: dict[str, Kind] = {
                 Parameter("turbulence", "1", 0.0, 1.0, 0.25, "standard deviation of the jet's speed over its mean"),
                 Parameter("turbulence_time", "s", 0.01, 10.0, 0.1, "its correlation time"),
             ),
-            scalar="scale",
+            shorthand="scale",
             requires="rotors",
         ),
-        Kind(
+        DisturbanceSpec(
             "ground_effect",
             "Rotors lift more close above the ground; see `artde_gym.disturbances.ground_effect`.",
             (Parameter("strength", "1", 0.0, 10.0, 1.0, "times which the published gain of thrust is larger"),),
-            scalar="strength",
+            shorthand="strength",
             requires="rotors",
         ),
-        Kind(
+        DisturbanceSpec(
             "sensor_noise",
             "White Gaussian noise on measurements, by standard deviation.",
             (
@@ -291,87 +291,87 @@ OWN: dict[str, Kind] = {
                 Parameter("tilt", "rad", 0.0, 0.5, 0.0, "roll and pitch of the base, or a vehicle's whole attitude"),
                 Parameter("angular_velocity", "rad/s", 0.0, 10.0, 0.0, "of the base or vehicle"),
             ),
-            scalar="position",
+            shorthand="position",
             requires="sensors",
         ),
-        Kind(
+        DisturbanceSpec(
             "encoder_bits",
             "Joint encoders of so many counts a turn; joint velocities are then differences of counts.",
             (Parameter("bits", "1", 6, 32, None, "2^bits counts a turn", integer=True),),
-            scalar="bits",
+            shorthand="bits",
             requires="encoders",
         ),
-        Kind(
-            "torque_delay",
+        DisturbanceSpec(
+            "action_delay",
             "Commands act late.",
-            (Parameter("samples", "1", 0, 100, None, "by so many control periods", integer=True),),
-            scalar="samples",
+            (Parameter("steps", "1", 0, 100, None, "by so many control periods", integer=True),),
+            shorthand="steps",
             requires="actuators",
         ),
-        Kind(
+        DisturbanceSpec(
             "cable_delay",
             "The cable of a payload is measured late, as by a camera: vector, rate, and whether the load hangs.",
             (Parameter("samples", "1", 0, 20, None, "by so many control periods", integer=True),),
-            scalar="samples",
+            shorthand="steps",
             requires="cable",
         ),
-        Kind(
+        DisturbanceSpec(
             "motor_lag",
             "Torques, or thrusts of rotors, follow commands as a first-order lag.",
             (Parameter("time_constant", "s", 0.0, 1.0, None, "of the lag; for rotors in place of their own 0.035 s"),),
-            scalar="time_constant",
+            shorthand="time_constant",
             requires="actuators",
         ),
-        Kind(
-            "actuator_loss",
+        DisturbanceSpec(
+            "actuator_effectiveness",
             "A joint gives a share of the commanded torque only, or a rotor a share of its thrust.",
             (
                 _word("joint", "joint", None, f"which one, or {ALL!r}"),
                 Parameter("factor", "1", 0.0, 1.0, 0.0, "share that is left"),
                 _time("start", 0.0, "from when"),
             ),
-            repeated=True,
+            multiple=True,
             requires="actuators",
         ),
-        Kind(
-            "mass_error",
+        DisturbanceSpec(
+            "mass_scale",
             "The robot is heavier or lighter than the nominal model, in all links, inertia included.",
             (Parameter("factor", "1", 0.5, 2.0, None, "true over nominal mass"),),
-            scalar="factor",
+            shorthand="factor",
             requires="mass",
         ),
-        Kind(
+        DisturbanceSpec(
             "initial_pose",
             "The episode starts off the reference pose.",
             (
                 _word("joint", "joint", ALL, f"which one, or {ALL!r}"),
                 Parameter("offset", "rad", -0.5, 0.5, None, "added to the reference angle"),
             ),
-            repeated=True,
+            multiple=True,
             requires="joints",
         ),
-        Kind(
+        DisturbanceSpec(
             "initial_position",
             "The episode starts off the reference path, at rest.",
             (Parameter("offset", "m", -0.3, 0.3, None, "added to the reference position", size=3),),
             requires="flight",
         ),
-        Kind(
+        DisturbanceSpec(
             "rotor_inertia",
-            'Rotors of another inertia than the nominal model\'s. It needs `actuator_inertia="rotor"`; `mass_error` '
+            'Rotors of another inertia than the nominal model\'s. It needs `actuator_inertia="rotor"`; `mass_scale` '
             "scales it, too.",
             (Parameter("inertia", "kg m^2", 0.005, 0.5, None, "reflected to each leg joint, instead of 0.045"),),
-            scalar="inertia",
+            shorthand="inertia",
             requires="armature",
         ),
-        Kind(
+        DisturbanceSpec(
             "mass_distribution",
             "Mass moves between the legs and the rest of the robot, inertia with it; the whole mass stays.",
             (Parameter("legs", "1", 0.5, 1.5, None, "mass of each link of the legs over the nominal one"),),
-            scalar="legs",
+            shorthand="legs",
             requires="legs",
         ),
-        Kind(
+        DisturbanceSpec(
             "contact",
             "Softer or stiffer contact of feet and ground.",
             (
@@ -385,27 +385,27 @@ OWN: dict[str, Kind] = {
                     "0.005 s), in Bullet 0.001 s over the share of the depth that it corrects in that time (0.0125 s)",
                 ),
             ),
-            scalar="time_constant",
+            shorthand="time_constant",
             requires="contact",
         ),
-        Kind(
+        DisturbanceSpec(
             "torque_limit",
             "Actuators that saturate below the bounds of the action.",
             (Parameter("limit", "Nm", 1.0, 40.0, None, "largest torque of each joint"),),
-            scalar="limit",
+            shorthand="limit",
             requires="torque_limit",
         ),
     )
 }
 """The kinds of this project by name."""
 
-KINDS: Registry[Kind] = Registry(
+DISTURBANCES: Registry[DisturbanceSpec] = Registry(
     "disturbance", "artde_gym.disturbances", lambda loaded: {kind.name: kind for kind in kinds_of(loaded)}, OWN
 )
 """All kinds by name: those of this project, of plug-ins, and those registered."""
 
 
-def register_disturbance(kind: Kind, effect: Effect, *, replace: bool = False) -> None:
+def register_disturbance(kind: DisturbanceSpec, effect: Effect, *, replace: bool = False) -> None:
     """Make a kind of disturbance known to the grammar, to environments and to the command line.
 
     Environments of robots that have its capability, and "effects", apply it from the first step of an episode on.
@@ -420,10 +420,10 @@ def register_disturbance(kind: Kind, effect: Effect, *, replace: bool = False) -
     """
     if kind.name in OWN:
         raise OptionError("disturbance", kind.name, f"a new name; these are taken: {', '.join(OWN)}")
-    KINDS.register(kind.name, dataclasses.replace(kind, effect=effect), replace=replace)
+    DISTURBANCES.register(kind.name, dataclasses.replace(kind, effect=effect), replace=replace)
 
 
-def kinds_of(loaded: Any) -> tuple[Kind, ...]:
+def kinds_of(loaded: Any) -> tuple[DisturbanceSpec, ...]:
     """Check what an entry point of the group `artde_gym.disturbances` has brought: a kind with an effect, or several.
 
     Raises:
@@ -431,16 +431,16 @@ def kinds_of(loaded: Any) -> tuple[Kind, ...]:
     """
     kinds = loaded if isinstance(loaded, tuple) else (loaded,)
     for kind in kinds:
-        if not (isinstance(kind, Kind) and kind.effect is not None):
+        if not (isinstance(kind, DisturbanceSpec) and kind.effect is not None):
             raise OptionError(
                 "entry point of artde_gym.disturbances", kind, "a Kind with an effect, or a tuple of them"
             )
     return kinds
 
 
-def in_order() -> list[Kind]:
+def in_order() -> list[DisturbanceSpec]:
     """Return all kinds in the order in which their values are drawn, which is not that of their registration."""
-    return [*OWN.values(), *(KINDS[name] for name in sorted(KINDS.keys() - OWN.keys()))]
+    return [*OWN.values(), *(DISTURBANCES[name] for name in sorted(DISTURBANCES.keys() - OWN.keys()))]
 
 
 INTRODUCTION = """\
@@ -461,7 +461,7 @@ what was drawn, in the same grammar, and `info` the same as numbers (`disturbanc
 replaces the disturbances of this and the following episodes; nothing is merged.
 
 Several kinds act together; kinds marked *list* take several entries. Anything outside the grammar, or a kind that the
-environment's robot does not honour, raises `DisturbanceError` when the environment is made or reset, with the key, the
+environment's robot does not honor, raises `DisturbanceError` when the environment is made or reset, with the key, the
 value and what is allowed.
 
 """
@@ -470,12 +470,12 @@ value and what is allowed.
 def page() -> str:
     """The grammar as a Markdown page, from the tables that check it."""
     lines = [f"| kind | {' | '.join(f'`{robot}`' for robot in ROBOTS)} |", "|---|" + "---|" * len(ROBOTS)]
-    for kind in KINDS.values():
+    for kind in DISTURBANCES.values():
         marks = ("yes" if kind.honored_by(robot) else "" for robot in ROBOTS)
         lines += [f"| `{kind.name}` | {' | '.join(marks)} |"]
     lines += [""]
-    for kind in KINDS.values():
-        marks = " (list)" if kind.repeated else ""
+    for kind in DISTURBANCES.values():
+        marks = " (list)" if kind.multiple else ""
         lines += [f"## `{kind.name}`{marks}", "", kind.text, "", "| parameter | unit | allowed | default | meaning |"]
         lines += ["|---|---|---|---|---|"]
         for parameter in kind.parameters:
@@ -486,14 +486,14 @@ def page() -> str:
                 default += f"; with `{parameter.with_other[0]}`: `{parameter.with_other[1]}`"
             default += "".join(f"; {robot}: `{value}`" for robot, value in other_defaults(kind, parameter).items())
             text = parameter.text + ("" if parameter.requires is None else f" ({_known_by(kind, parameter)} only)")
-            text += " (what a bare number stands for)" if parameter.name == kind.scalar else ""
+            text += " (what a bare number stands for)" if parameter.name == kind.shorthand else ""
             row = (f"`{parameter.name}`", parameter.unit, allowed(parameter), default, text)
             lines.append("| " + " | ".join(row) + " |")
         lines.append("")
     return INTRODUCTION + "\n".join(lines)
 
 
-def _known_by(kind: Kind, parameter: Parameter) -> str:
+def _known_by(kind: DisturbanceSpec, parameter: Parameter) -> str:
     """Name the robots that know a parameter."""
     return ", ".join(robot for robot in ROBOTS if kind.honored_by(robot) and parameter in kind.parameters_for(robot))
 
@@ -502,14 +502,14 @@ def parameters_of(kind: str, given: Any) -> dict[str, Any]:
     """Return a disturbance's parameters, also from the short form of a bare number or distribution."""
     if given is None:
         return {}
-    scalar = KINDS[kind].scalar
-    names = {parameter.name for parameter in KINDS[kind].parameters}
+    scalar = DISTURBANCES[kind].shorthand
+    names = {parameter.name for parameter in DISTURBANCES[kind].parameters}
     if isinstance(given, Mapping) and (scalar is None or not names.isdisjoint(given)):
         return dict(given)
     return {str(scalar): given}
 
 
-def other_defaults(kind: Kind, parameter: Parameter) -> dict[str, Any]:
+def other_defaults(kind: DisturbanceSpec, parameter: Parameter) -> dict[str, Any]:
     """Return a parameter's defaults of robots that have another one than the kind."""
     path = f"{kind.name}.{parameter.name}"
     return {name: kit.defaults[path] for name, kit in ROBOTS.items() if path in kit.defaults}
@@ -517,10 +517,10 @@ def other_defaults(kind: Kind, parameter: Parameter) -> dict[str, Any]:
 
 def allowed(parameter: Parameter) -> str:
     """What a parameter accepts, in words."""
-    if isinstance(parameter.words, str):
-        return f"a {parameter.words} of the robot"
-    if parameter.words:
-        return ", ".join(parameter.words)
+    if isinstance(parameter.choices, str):
+        return f"a {parameter.choices} of the robot"
+    if parameter.choices:
+        return ", ".join(parameter.choices)
     unit = "" if parameter.unit in ("", "1") else f" {parameter.unit}"
     number = "whole numbers " if parameter.integer else ""
     each = f"{parameter.size} numbers, each " if parameter.size > 1 else ""

@@ -23,7 +23,7 @@ from numpy.typing import DTypeLike, NDArray
 from artde_gym.arrays import Array
 from artde_gym.disturbances.noise import Integers, normal_noise
 from artde_gym.multibody.dynamics import GRAVITY
-from artde_gym.sim.rigid_bodies import cross, times, transposed_times, turned
+from artde_gym.sim.rigid_bodies import cross, rotate_frames, times, transposed_times
 
 FRAME = 1 / 60  # s
 POSITION_NOISE = 3e-4  # m, standard deviation of each component, as all that follow
@@ -74,7 +74,7 @@ class Mocap:
         force[2] += GRAVITY
         force = transposed_times(rot, force) + ACCELEROMETER_NOISE * noise[3:6]
 
-        attitude = turned(self._rot, (0.5 * period) * (self._rates + reading))
+        attitude = rotate_frames(self._rot, (0.5 * period) * (self._rates + reading))
         change = period * times(attitude, force)
         change[2] -= period * GRAVITY
         place = self._position + period * (self._velocity + 0.5 * change)
@@ -82,12 +82,12 @@ class Mocap:
 
         framed = _frame(sample, period) > _frame(sample - 1, period)
         error = framed * (position + POSITION_NOISE * noise[6:9] - place)
-        error_rot = framed * _turn_between(attitude, turned(rot, ATTITUDE_NOISE * noise[9:12]))
+        error_rot = framed * _turn_between(attitude, rotate_frames(rot, ATTITUDE_NOISE * noise[9:12]))
         start = sample == 0
         self._true_velocity = velocity.copy()
         self._position = np.where(start, position, place + self._alpha * error)
         self._velocity = np.where(start, velocity, speed + self._beta_rate * error)
-        self._rot = np.where(start, rot, turned(attitude, self._kappa * error_rot))
+        self._rot = np.where(start, rot, rotate_frames(attitude, self._kappa * error_rot))
         self._rates = reading
         if new is not None:
             chosen = (np.where(new, now, then) for now, then in zip(self._known(), before, strict=True))

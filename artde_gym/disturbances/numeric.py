@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from artde_gym.disturbances.kinds import KINDS, Parameter
+from artde_gym.disturbances.kinds import DISTURBANCES, Parameter
 
 Words = Mapping[str, Sequence[str]]
 """Names of a robot's sites and joints, by "site" and "joint"."""
@@ -23,13 +23,13 @@ def numeric(sampled: Mapping[str, Any], words: Words) -> dict[str, Any]:
     """Name each number, words being replaced by numbers and lists of entries by arrays."""
     told: dict[str, Any] = {}
     for kind, value in sampled.items():
-        entries = value if KINDS[kind].repeated else (value,)
-        for parameter in KINDS[kind].parameters:
+        entries = value if DISTURBANCES[kind].multiple else (value,)
+        for parameter in DISTURBANCES[kind].parameters:
             if not all(parameter.name in entry for entry in entries):
                 continue  # one of several of which only one is given
             told[f"disturbance.{kind}.{parameter.name}"] = (
                 np.array([number_of(parameter, entry[parameter.name], words) for entry in value])
-                if KINDS[kind].repeated
+                if DISTURBANCES[kind].multiple
                 else number_of(parameter, value[parameter.name], words)
             )
     return told
@@ -38,6 +38,6 @@ def numeric(sampled: Mapping[str, Any], words: Words) -> dict[str, Any]:
 def number_of(parameter: Parameter, value: Any, words: Words) -> Any:
     """Return a sampled value as a number or an array; a word is its place among those allowed."""
     if parameter.size == 0:
-        known = words[parameter.words] if isinstance(parameter.words, str) else parameter.words
+        known = words[parameter.choices] if isinstance(parameter.choices, str) else parameter.choices
         return list(known).index(value)
     return np.array(value) if parameter.size > 1 else value

@@ -16,7 +16,7 @@ EVENTS = PUSH_BEGINS, PUSH_ENDS, ATTACHED, DROPPED = "push_begins", "push_ends",
 class Loaded(Protocol):
     """What a schedule acts on: an engine's `World`, or the dynamics of a plug-in's own."""
 
-    def push(self, site: str, force: Vector) -> None: ...
+    def apply_force(self, site: str, force: Vector) -> None: ...
     def attach_payload(self, mass: float, position: Vector) -> None: ...
     def release_payload(self) -> None: ...
 
@@ -37,7 +37,7 @@ class Push(NamedTuple):
 
     @classmethod
     def of(cls, entry: Mapping[str, Any], time_step: float) -> Push:
-        """A realised push, in steps of `time_step` (s)."""
+        """A sampled push, in steps of `time_step` (s)."""
         direction = np.asarray(entry["direction"])
         x, y, z = (entry["magnitude"] * direction / np.linalg.norm(direction)).tolist()
         first = round(entry["start"] / time_step)
@@ -47,21 +47,21 @@ class Push(NamedTuple):
 class Schedule:
     """The timed disturbances of one episode, in physics steps of `time_step` (s)."""
 
-    def __init__(self, realised: Mapping[str, Any], time_step: float) -> None:
+    def __init__(self, sampled: Mapping[str, Any], time_step: float) -> None:
         self._time_step = time_step
-        self._pushes = [Push.of(entry, time_step) for entry in realised.get("push", ())]
-        self._payload: Mapping[str, Any] = realised.get("payload", {})
+        self._pushes = [Push.of(entry, time_step) for entry in sampled.get("push", ())]
+        self._payload: Mapping[str, Any] = sampled.get("payload", {})
         self._changes: dict[int, list[str]] = {}
         for push in self._pushes:
             self._announce(push)
-        if self._payload and self._payload["drop"] > self._payload["attach"]:
-            if self._payload["attach"] > 0:
-                self._add(round(self._payload["attach"] / time_step), ATTACHED)
-            self._add(round(self._payload["drop"] / time_step), DROPPED)
+        if self._payload and self._payload["detach_time"] > self._payload["attach_time"]:
+            if self._payload["attach_time"] > 0:
+                self._add(round(self._payload["attach_time"] / time_step), ATTACHED)
+            self._add(round(self._payload["detach_time"] / time_step), DROPPED)
 
     def start(self, world: Loaded) -> None:
         """Bring about what is there before the first step."""
-        if self._payload.get("attach") == 0 and self._payload["drop"] > 0:
+        if self._payload.get("attach_time") == 0 and self._payload["detach_time"] > 0:
             self._attach(world)
 
     def add(self, push: Push) -> None:
@@ -72,10 +72,10 @@ class Schedule:
     def drop(self, step: int) -> bool:
         """Drop the payload at a step instead of later; False if it is not there then."""
         time = step * self._time_step
-        if not self._payload or not self._payload["attach"] <= time < self._payload["drop"]:
+        if not self._payload or not self._payload["attach_time"] <= time < self._payload["detach_time"]:
             return False
-        self._changes[round(self._payload["drop"] / self._time_step)].remove(DROPPED)
-        self._payload = {**self._payload, "drop": time}
+        self._changes[round(self._payload["detach_time"] / self._time_step)].remove(DROPPED)
+        self._payload = {**self._payload, "detach_time": time}
         self._add(step, DROPPED)
         return True
 
@@ -102,7 +102,7 @@ class Schedule:
             elif event == DROPPED:
                 world.release_payload()
         for push in self.acting(step):
-            world.push(push.site, push.force)
+            world.apply_force(push.site, push.force)
         return events
 
     def _attach(self, world: Loaded) -> None:

@@ -19,7 +19,7 @@ class Sensing:
     difference of two readings over the control period: what a controller with encoders has before any filter.
 
     Args:
-        realised: drawn disturbances, of which "sensor_noise" and "encoder_bits" matter here.
+        sampled: drawn disturbances, of which "sensor_noise" and "encoder_bits" matter here.
         layout: of the observation.
         period: of control (s).
         rng: of the environment.
@@ -34,10 +34,10 @@ class Sensing:
         ("angular_velocity", "base_angular_velocity"),
     )
 
-    def __init__(self, realised: Mapping[str, Any], layout: Layout, period: float, rng: np.random.Generator) -> None:
-        noise = realised.get("sensor_noise", {})
+    def __init__(self, sampled: Mapping[str, Any], layout: Layout, period: float, rng: np.random.Generator) -> None:
+        noise = sampled.get("sensor_noise", {})
         self._noise = [(layout[field], noise[name]) for name, field in self._FIELDS if noise.get(name, 0.0) > 0]
-        bits = realised.get("encoder_bits", {}).get("bits")
+        bits = sampled.get("encoder_bits", {}).get("bits")
         self._count = None if bits is None else 2 * math.pi / 2**bits
         self._q, self._qd = layout["q"], layout["qd"]
         self._period = period

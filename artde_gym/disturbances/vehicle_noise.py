@@ -10,7 +10,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from artde_gym.arrays import Array
 from artde_gym.disturbances.noise import Integers, normal_noise
-from artde_gym.sim.rigid_bodies import turned
+from artde_gym.sim.rigid_bodies import rotate_frames
 
 BEYOND = np.uint64(2**40)  # samples, further than any flight goes: from there on the stream is the cable's
 
@@ -21,9 +21,9 @@ class VehicleNoise:
     def __init__(self, n: int, dtype: DTypeLike) -> None:
         self._deviations = np.zeros((len(_NAMES), n), dtype)
 
-    def begin(self, vehicle: int, realised: Mapping[str, Any]) -> None:
-        """Begin an episode of one vehicle, with realised disturbances."""
-        noise = realised.get("sensor_noise", {})
+    def begin(self, vehicle: int, sampled: Mapping[str, Any]) -> None:
+        """Begin an episode of one vehicle, with sampled disturbances."""
+        noise = sampled.get("sensor_noise", {})
         self._deviations[:, vehicle] = [noise.get(name, 0.0) for name in _NAMES]
 
     def measure(
@@ -34,7 +34,7 @@ class VehicleNoise:
         of_position, of_velocity, of_attitude, of_rates = self._deviations
         position += of_position * noise[0:3]
         velocity += of_velocity * noise[3:6]
-        np.copyto(rot, turned(rot, of_attitude * noise[6:9]), where=of_attitude > 0)
+        np.copyto(rot, rotate_frames(rot, of_attitude * noise[6:9]), where=of_attitude > 0)
         rates += of_rates * noise[9:12]
 
     def measure_cable(

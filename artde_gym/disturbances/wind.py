@@ -50,7 +50,7 @@ class Air(NamedTuple, Generic[Number]):
 
 
 def air(wind: Mapping[str, Any] | None) -> Air[float]:
-    """The air of a realised disturbance `wind`, or calm air."""
+    """The air of a sampled disturbance `wind`, or calm air."""
     if wind is None:
         return Air._make([0.0] * len(Air._fields))
     direction = wind["fan_direction"]
@@ -58,7 +58,7 @@ def air(wind: Mapping[str, Any] | None) -> Air[float]:
     numbers = (
         *(wind["scale"] * component for component in wind["steady"]),
         *(wind["scale"] * wind["fan_speed"] * component for component in axis),
-        *wind["fan_place"],
+        *wind["fan_position"],
         *axis,
         -0.5 / wind["fan_radius"] ** 2,
     )

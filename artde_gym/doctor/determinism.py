@@ -9,7 +9,7 @@ from typing import Any
 import gymnasium as gym
 
 import artde_gym  # noqa: F401  # registers the environments
-from artde_gym.doctor.outcome import Outcome
+from artde_gym.doctor.check_result import CheckResult
 from artde_gym.registration import make_controller
 from artde_gym.sim.factory import installed_engines
 
@@ -18,7 +18,7 @@ WALK, FLIGHT = "BipedWalk-Payload-v0", "QuadInfinity-Payload-v0"
 REMEDY = "see docs/determinism.md; results of this machine cannot be repeated to the bit"
 
 
-def determinism() -> list[Outcome]:
+def determinism() -> list[CheckResult]:
     """The same closed loop twice here and once in another process, in every engine."""
     names = runs()
     with multiprocessing.get_context("spawn").Pool(1) as pool:
@@ -28,10 +28,10 @@ def determinism() -> list[Outcome]:
     outcomes = []
     for name, (first, second), other in zip(names, here, elsewhere, strict=True):
         if first == second == other:
-            outcomes.append(Outcome(name, "ok", "the same bits twice, and in another process"))
+            outcomes.append(CheckResult(name, "ok", "the same bits twice, and in another process"))
         else:
             where = "in one process" if first != second else "from one process to another"
-            outcomes.append(Outcome(name, "failed", f"results differ {where}", REMEDY))
+            outcomes.append(CheckResult(name, "failed", f"results differ {where}", REMEDY))
     return outcomes
 
 

@@ -14,8 +14,8 @@ import numpy as np
 from gymnasium.utils.env_checker import check_env
 
 import artde_gym  # noqa: F401  # registers the environments
-from artde_gym.disturbances import KINDS
-from artde_gym.doctor.outcome import Outcome
+from artde_gym.disturbances import DISTURBANCES
+from artde_gym.doctor.check_result import CheckResult
 from artde_gym.evaluation.environments import arguments_of, ours, robot_of, vector
 from artde_gym.sim.factory import ENGINES, resolve_engine
 
@@ -25,27 +25,27 @@ IN_SI_UNITS = r".*(symmetric and normalized|recommend using np.float32)"
 REMEDY = "pip install -c constraints.txt --force-reinstall . : the tests pass with these versions"
 
 
-def in_engine(name: str) -> list[Outcome]:
+def in_engine(name: str) -> list[CheckResult]:
     """Run Gymnasium's checker on every environment in an engine, where it is there.
 
     Environments that know no engine are checked with the default one's.
     """
     default = resolve_engine(None)
     if missing := ENGINES[name].missing():
-        return [Outcome(ENGINES[name].title, "missing", f"the default engine is {ENGINES[default].title}", missing)]
+        return [CheckResult(ENGINES[name].title, "missing", f"the default engine is {ENGINES[default].title}", missing)]
     chosen = [env_id for env_id in ours() if name == default or "engine" in arguments_of(env_id)]
     return [_checked(env_id, name, _gymnasium) for env_id in chosen]
 
 
-def stable_baselines3() -> list[Outcome]:
+def stable_baselines3() -> list[CheckResult]:
     """Stable-Baselines3's checker on every environment."""
     if importlib.util.find_spec("stable_baselines3") is None:
-        return [Outcome("Stable-Baselines3", "missing", "not installed", "pip install 'artde-gym[rl]'")]
+        return [CheckResult("Stable-Baselines3", "missing", "not installed", "pip install 'artde-gym[rl]'")]
     checker = importlib.import_module("stable_baselines3.common.env_checker")
     return [_checked(name, resolve_engine(None), checker.check_env) for name in ours()]
 
 
-def batch() -> list[Outcome]:
+def batch() -> list[CheckResult]:
     """Vectors of environments: shapes, bounds, and that a vector of one equals a part of a vector of many."""
     outcomes = []
     for name in ours():
@@ -63,7 +63,7 @@ def batch() -> list[Outcome]:
         many.close()
         one.close()
         text = "8 at once, the first as if alone"
-        outcomes.append(Outcome(name, "ok", text) if same else Outcome(name, "failed", f"not {text}", REMEDY))
+        outcomes.append(CheckResult(name, "ok", text) if same else CheckResult(name, "failed", f"not {text}", REMEDY))
     return outcomes
 
 
@@ -74,12 +74,12 @@ def _gymnasium(env: Any) -> None:
 def _arguments(name: str, engine: str | None = None) -> dict[str, Any]:
     """Arguments for a short episode with a payload, as far as the environment takes them."""
     wanted: dict[str, Any] = {"duration": DURATION, "engine": engine} if engine else {"duration": DURATION}
-    if KINDS["payload"].honored_by(robot_of(name)):
+    if DISTURBANCES["payload"].honored_by(robot_of(name)):
         wanted["disturbances"] = PAYLOAD
     return {argument: value for argument, value in wanted.items() if argument in arguments_of(name)}
 
 
-def _checked(name: str, engine: str, checker: Callable[[Any], None]) -> Outcome:
+def _checked(name: str, engine: str, checker: Callable[[Any], None]) -> CheckResult:
     try:
         env = gym.make(name, disable_env_checker=True, **_arguments(name, engine))
         with warnings.catch_warnings(record=True) as caught:
@@ -88,7 +88,7 @@ def _checked(name: str, engine: str, checker: Callable[[Any], None]) -> Outcome:
             checker(env.unwrapped)
         env.close()
     except Exception as error:
-        return Outcome(name, "failed", f"{type(error).__name__}: {error}", REMEDY)
+        return CheckResult(name, "failed", f"{type(error).__name__}: {error}", REMEDY)
     if caught:
-        return Outcome(name, "ok", f"check_env passes, and says: {caught[0].message}")
-    return Outcome(name, "ok", "check_env passes")
+        return CheckResult(name, "ok", f"check_env passes, and says: {caught[0].message}")
+    return CheckResult(name, "ok", "check_env passes")

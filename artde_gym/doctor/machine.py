@@ -13,7 +13,7 @@ from pathlib import Path
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 
-from artde_gym.doctor.outcome import Outcome, Status
+from artde_gym.doctor.check_result import CheckResult, Status
 from artde_gym.sim.factory import missing_bullet
 
 PACKAGE = "artde-gym"
@@ -23,13 +23,13 @@ DISK = 1e9  # bytes, of which a results folder seldom needs more
 RUNS = Path("runs")
 
 
-def python() -> list[Outcome]:
+def python() -> list[CheckResult]:
     """The interpreter, and what the package cannot do without."""
     try:
         wanted = str(metadata.metadata(PACKAGE)["Requires-Python"])
     except metadata.PackageNotFoundError:
         return [
-            Outcome(
+            CheckResult(
                 PACKAGE, "failed", "on the path, but not installed", "pip install -c constraints.txt -e . in its folder"
             )
         ]
@@ -38,25 +38,25 @@ def python() -> list[Outcome]:
     right = SpecifierSet(wanted).contains(version) and platform.python_implementation() == "CPython"
     here = f"{platform.python_implementation()} {version} on {system}"
     remedy = f"make a virtual environment of CPython {wanted}, 3.11 for both physics engines: python3.11 -m venv .venv"
-    outcomes = [Outcome("Python", "ok", here) if right else Outcome("Python", "failed", here, remedy)]
+    outcomes = [CheckResult("Python", "ok", here) if right else CheckResult("Python", "failed", here, remedy)]
     outcomes += [_installed(one, "failed", f"pip install '{one}'") for one in _requirements(None)]
     for name, module in MODULES.items():
         try:
             importlib.import_module(module)
         except Exception as error:
             again = f"pip install --force-reinstall --no-deps {name}"
-            outcomes.append(Outcome(f"import {module}", "failed", f"{type(error).__name__}: {error}", again))
+            outcomes.append(CheckResult(f"import {module}", "failed", f"{type(error).__name__}: {error}", again))
     return [*outcomes, _engine()]
 
 
-def _engine() -> Outcome:
+def _engine() -> CheckResult:
     """The default physics engine, and why it is this one."""
     if missing := missing_bullet():
-        return Outcome("default engine", "missing", "MuJoCo, since PyBullet cannot be imported", missing)
-    return Outcome("default engine", "ok", "PyBullet, since it can be imported")
+        return CheckResult("default engine", "missing", "MuJoCo, since PyBullet cannot be imported", missing)
+    return CheckResult("default engine", "ok", "PyBullet, since it can be imported")
 
 
-def extras() -> list[Outcome]:
+def extras() -> list[CheckResult]:
     """Every extra with the versions of its packages."""
     outcomes = []
     for extra in metadata.metadata(PACKAGE).get_all("Provides-Extra") or ():
@@ -64,11 +64,11 @@ def extras() -> list[Outcome]:
         found = [_installed(requirement, "missing", remedy) for requirement in _requirements(extra)]
         text = ", ".join(f"{outcome.what} {outcome.found}" for outcome in found)
         whole = all(outcome.status == "ok" for outcome in found)
-        outcomes.append(Outcome(f"extra [{extra}]", "ok" if whole else "missing", text, "" if whole else remedy))
+        outcomes.append(CheckResult(f"extra [{extra}]", "ok" if whole else "missing", text, "" if whole else remedy))
     return outcomes
 
 
-def files() -> list[Outcome]:
+def files() -> list[CheckResult]:
     """Whether results can be written where they go by default, and whether there is room."""
     folder = RUNS.absolute()
     place = next(parent for parent in (folder, *folder.parents) if parent.exists())
@@ -79,13 +79,13 @@ def files() -> list[Outcome]:
             os.fsync(file.fileno())
     except OSError as error:
         remedy = "go to a folder that you may write in, or name one with --out"
-        return [Outcome("results folder", "failed", f"{place}: {error.strerror}", remedy)]
+        return [CheckResult("results folder", "failed", f"{place}: {error.strerror}", remedy)]
     free = shutil.disk_usage(place).free
     room = f"{free / 1e9:.1f} GB free"
-    outcomes = [Outcome("results folder", "ok", f"{RUNS}/ can be written")]
+    outcomes = [CheckResult("results folder", "ok", f"{RUNS}/ can be written")]
     if free < DISK:
-        return [*outcomes, Outcome("disk", "missing", room, "make room, or name a folder elsewhere with --out")]
-    return [*outcomes, Outcome("disk", "ok", room)]
+        return [*outcomes, CheckResult("disk", "missing", room, "make room, or name a folder elsewhere with --out")]
+    return [*outcomes, CheckResult("disk", "ok", room)]
 
 
 def _requirements(extra: str | None) -> list[Requirement]:
@@ -100,11 +100,11 @@ def _requirements(extra: str | None) -> list[Requirement]:
     return found
 
 
-def _installed(requirement: Requirement, otherwise: Status, remedy: str) -> Outcome:
+def _installed(requirement: Requirement, otherwise: Status, remedy: str) -> CheckResult:
     try:
         version = metadata.version(requirement.name)
     except metadata.PackageNotFoundError:
-        return Outcome(requirement.name, otherwise, "not installed", remedy)
+        return CheckResult(requirement.name, otherwise, "not installed", remedy)
     if not requirement.specifier.contains(version, prereleases=True):
-        return Outcome(requirement.name, otherwise, f"{version}, not {requirement.specifier}", remedy)
-    return Outcome(requirement.name, "ok", version)
+        return CheckResult(requirement.name, otherwise, f"{version}, not {requirement.specifier}", remedy)
+    return CheckResult(requirement.name, "ok", version)

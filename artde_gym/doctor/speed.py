@@ -7,7 +7,7 @@ import os
 from artde_gym.benchmark.environments import ENGINES, biped
 from artde_gym.benchmark.timing import TURN, ClosedLoop, Replay, in_turns
 from artde_gym.benchmark.walk import LEAST, BareWalk
-from artde_gym.doctor.outcome import Outcome
+from artde_gym.doctor.check_result import CheckResult
 
 ROUNDS = 10
 SHARE = 0.75
@@ -15,10 +15,10 @@ SHARE = 0.75
 REAL_TIME = 1000  # steps of 1 ms a second
 
 
-def speed() -> list[Outcome]:
+def speed() -> list[CheckResult]:
     """Steps a second of the biped, alone and against the bare engine."""
     load = f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""  # not on Windows
-    outcomes = [Outcome("processors", "ok", f"{os.cpu_count()}{load}")]
+    outcomes = [CheckResult("processors", "ok", f"{os.cpu_count()}{load}")]
     for engine, written in ENGINES.items():
         loop = ClosedLoop("artde", biped(engine=engine))
         variants = {"loop": loop.turn, "alone": Replay(loop, biped(engine=engine)).turn,
@@ -35,5 +35,5 @@ def speed() -> list[Outcome]:
     return outcomes
 
 
-def _judged(what: str, found: str, fast: bool, remedy: str) -> Outcome:
-    return Outcome(what, "ok", found) if fast else Outcome(what, "missing", found, remedy)
+def _judged(what: str, found: str, fast: bool, remedy: str) -> CheckResult:
+    return CheckResult(what, "ok", found) if fast else CheckResult(what, "missing", found, remedy)

@@ -11,15 +11,15 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from artde_gym.arguments import action_array, known_arguments, seed_number
+from artde_gym.arguments import action_array, check_seed, known_arguments
 from artde_gym.arrays import Array, total
 from artde_gym.disturbances.effects import Effects
 from artde_gym.disturbances.ground import LOADED, GrfPulses
 from artde_gym.disturbances.schedule import Schedule
-from artde_gym.envs.biped_course import Course
-from artde_gym.envs.closed import CLOSED
+from artde_gym.envs.biped_disturbances import EpisodeDisturbances
+from artde_gym.envs.closed_env import CLOSED
 from artde_gym.envs.documentation import filled
-from artde_gym.envs.live import Live
+from artde_gym.envs.interactive import InteractiveMixin
 from artde_gym.envs.options import disturbances_in, warn_of_idle
 from artde_gym.envs.view import View
 from artde_gym.errors import OptionError
@@ -58,7 +58,7 @@ pushes and payloads began and ended in this control period, `push_begins`, `push
 )
 
 
-class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
+class BipedEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any]]):
     """What all tasks of Ojas share; a subclass says what disturbs the walk by default.
 
     Args:
@@ -83,7 +83,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
     default_disturbances: ClassVar[Mapping[str, Any]] = {}
     action_layout = task.ACTION
     robot_name: ClassVar[str] = "ojas"
-    tracking = task.TRACKING
+    metrics_spec = task.METRICS_SPEC
     fall_reasons: ClassVar[Sequence[str]] = task.FALL_REASONS
 
     @known_arguments
@@ -125,14 +125,14 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         self.action_space = task.ACTION.box()
         self._limit = robot.TORQUE_LIMIT
         self._engine.set_friction(task.FRICTION)
-        self._engine.place(walk.position, walk.start)
+        self._engine.reset(walk.position, walk.start)
         self._still = self._settle(walk.start, task.SETTLE_STEPS)
-        self._settled = self._engine.snapshot()
+        self._settled = self._engine.save_state()
         self._k, self._last, self._over = 0, walk.last, True  # no step before the first reset
-        self._state, self.words = self._engine.read(), walk.words
+        self._state, self.words = self._engine.state(), walk.words
         self._sample({})
         warn_of_idle(self._disturbances, self._last * self.control_period)
-        self._course = Course(self._realised, walk, self.np_random)
+        self._active = EpisodeDisturbances(self._sampled, walk, self.np_random)
         self._pulses: GrfPulses | None = None
         self._effects = Effects(1, self.words)
 
@@ -148,10 +148,10 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         if disturbances is not None:
             self._disturbances = self._walk.parse(disturbances)
             warn_of_idle(self._disturbances, self._last * self.control_period)
-        super().reset(seed=seed_number("seed", seed))
-        realised = self._disturbances.draw(self.np_random)
-        self._sample(realised)
-        self._tau = self._begin(realised)
+        super().reset(seed=check_seed("seed", seed))
+        sampled = self._disturbances.sample(self.np_random)
+        self._sample(sampled)
+        self._tau = self._begin(sampled)
         self._k, self._over = 0, False
         self.view.reset()
         observation = self._measure()
@@ -187,7 +187,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         step = self.elapsed
         home = (float(self.pattern.base[step, 0]), 0.0, CAMERA_HEIGHT)
         pushes = self.schedule.acting(step)
-        return self.view.picture(step * task.TIME_STEP, home, pushes, self._realised, over=self._over)
+        return self.view.picture(step * task.TIME_STEP, home, pushes, self._sampled, over=self._over)
 
     def close(self) -> None:
         self._engine.close()
@@ -204,49 +204,49 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
 
     @property
     def schedule(self) -> Schedule:
-        return self._course.schedule
+        return self._active.schedule
 
-    def _begin(self, realised: Mapping[str, Any]) -> Array:
+    def _begin(self, sampled: Mapping[str, Any]) -> Array:
         """Set an episode up and let the robot come to rest in it; returns the joint torques in the end."""
-        self._engine.restore(self._settled)
-        self._walk.set_up(self._engine, realised)
-        self._course = Course(realised, self._walk, self.np_random)
-        self._course.start(self._engine)
-        self._limit = task.torque_limit(realised)
+        self._engine.restore_state(self._settled)
+        self._walk.set_up(self._engine, sampled)
+        self._active = EpisodeDisturbances(sampled, self._walk, self.np_random)
+        self._active.start(self._engine)
+        self._limit = task.torque_limit(sampled)
         self._pulses = None
-        if "grf_pulse" in realised:
+        if "grf_pulse" in sampled:
             self._pulses = self._walk.pulses(1)
-            self._pulses.begin(0, realised["grf_pulse"], self.nominal_robot)
-        self._effects.begin(0, realised)
-        steps = task.settling(realised)
-        tau = self._settle(self._walk.pose(realised), steps) if steps else self._still
-        self._course.settled(tau)
+            self._pulses.begin(0, sampled["grf_pulse"], self.nominal_robot)
+        self._effects.begin(0, sampled)
+        steps = task.settling(sampled)
+        tau = self._settle(self._walk.pose(sampled), steps) if steps else self._still
+        self._active.begin_walk(tau)
         return tau
 
     def _settle(self, pose: Array, steps: int) -> Array:
         """Stand still for so many time steps; returns the torques in the end."""
         tau = self._walk.stand
         for _ in range(steps):
-            state = self._engine.read()
+            state = self._engine.state()
             tau = self._walk.hold(pose, state.q, state.qd)
             self._engine.step(tau)
         return np.clip(tau, -robot.TORQUE_LIMIT, robot.TORQUE_LIMIT)
 
     def _simulate(self, command: Array) -> list[str]:
         """Let `command` act for one control period, with what disturbs it; returns what began or ended meanwhile."""
-        engine, course = self._engine, self._course
+        engine, active = self._engine, self._active
         events: list[str] = []
         first, affected = self.elapsed, self._effects.acting[0]
-        course.begin(command)
+        active.begin_period(command)
         for step in range(first, first + self._walk.substeps):
-            tau = course.act(step, engine, events)
+            tau = active.apply(step, engine, events)
             if self._pulses is not None:
                 loads = np.array([engine.foot_loads()])
                 engine.lift_feet(self._pulses.forces(loads, np.array([step]))[0].tolist())
             if affected:
-                tau = tau + self._effects.act(engine, engine.read(), step * task.TIME_STEP)
+                tau = tau + self._effects.apply(engine, engine.state(), step * task.TIME_STEP)
             engine.step(tau)
-        self._tau = course.applied()
+        self._tau = active.applied()
         return events
 
     def _info(self, terms: dict[str, float], falls: Sequence[bool], events: Sequence[str]) -> dict[str, Any]:
@@ -257,7 +257,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
 
     def _measure(self) -> Array:
         """Read the engine; returns the observation."""
-        state = self._state = self._engine.read()
+        state = self._state = self._engine.state()
         loads = self._loads = self._engine.foot_loads()
         self._tilt = roll_pitch(state.quat_xyzw, math.atan2, arcsine)
         contact = [load > LOADED for load in loads]
@@ -267,7 +267,7 @@ class BipedEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         if self.observe_ground_force:
             parts.append(self._engine.ground_forces().ravel())
         observation = np.concatenate(parts)
-        sensing = self._course.sensing
+        sensing = self._active.sensing
         return observation if sensing is None else sensing.disturb(observation)
 
     def _reward_terms(self, previous: Array) -> dict[str, float]:

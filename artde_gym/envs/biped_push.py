@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from artde_gym.envs import biped_batch
+from artde_gym.envs import biped_vector
 from artde_gym.envs.biped import BipedEnv, document
 from artde_gym.robots.ojas.pushes import ARM_PUSH, CHEST_PUSH
 
@@ -32,8 +32,8 @@ class BipedPushEnv(BipedEnv):
     default_disturbances = DISTURBANCES
 
 
-@biped_batch.document(_DEFAULT)
-class BipedPushVectorEnv(biped_batch.BipedVectorEnv):
+@biped_vector.document(_DEFAULT)
+class BipedPushVectorEnv(biped_vector.BipedVectorEnv):
     """Many robots walk with a payload and are pushed twice, as the one of `BipedPushEnv`.
 
     {shared}

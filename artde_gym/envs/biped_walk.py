@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from artde_gym.envs import biped_batch
+from artde_gym.envs import biped_vector
 from artde_gym.envs.biped import BipedEnv, document
 
 DISTURBANCES: dict[str, Any] = {"payload": 1.3}
@@ -29,8 +29,8 @@ class BipedWalkPayloadEnv(BipedEnv):
     default_disturbances = DISTURBANCES
 
 
-@biped_batch.document(_DEFAULT)
-class BipedWalkPayloadVectorEnv(biped_batch.BipedVectorEnv):
+@biped_vector.document(_DEFAULT)
+class BipedWalkPayloadVectorEnv(biped_vector.BipedVectorEnv):
     """Many robots walk with a payload, as the one of `BipedWalkPayloadEnv`.
 
     {shared}

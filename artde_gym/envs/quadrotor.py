@@ -11,16 +11,16 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from artde_gym.arguments import action_array, known_arguments, seed_number, steps_per_period
+from artde_gym.arguments import action_array, check_seed, known_arguments, steps_per_period
 from artde_gym.arrays import Array, total
 from artde_gym.disturbances.effects import Effects, load_base
 from artde_gym.disturbances.ground_effect import thrust_gain
 from artde_gym.disturbances.noise import draw_keys
 from artde_gym.disturbances.schedule import Schedule
 from artde_gym.disturbances.wind import GRID, Wind
-from artde_gym.envs.closed import CLOSED
+from artde_gym.envs.closed_env import CLOSED
 from artde_gym.envs.documentation import filled
-from artde_gym.envs.live import Live
+from artde_gym.envs.interactive import InteractiveMixin
 from artde_gym.envs.options import disturbances_in, warn_of_idle
 from artde_gym.envs.quadrotor_sensors import Measurement, Sensors
 from artde_gym.envs.view import View
@@ -40,20 +40,20 @@ STEPS = 5  # physics steps from one grid point to the next
 
 CENTRE: Vector = (0.0, 0.0, 0.6)  # m, of the path
 CAMERA = Camera(CENTRE, distance=3.0, yaw_deg=35.0, pitch_deg=24.0)
-SHARE, LEEWAY = 0.5, 0.6  # of the vehicle's way from the centre; m, that it may be off the picture's middle
+SHARE, LEEWAY = 0.5, 0.6  # of the vehicle's way from the center; m, that it may be off the picture's middle
 
 _NOTHING = (0.0, 0.0, 0.0)
 _NO_JOINTS = np.zeros(0)
 
 
 @filled(shared=task.DOCUMENTATION)
-class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
+class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any]]):
     """A quadrotor flies an infinity-shaped path with a payload, drops it half-way, and flies the path once more.
 
     ## Description
     After section 3.5 of Dantu, *Adaptive Artificial Time Delay Control for Robotic Systems* (2023): a Q-450 frame, a
     payload of 0.35 kg until 35 s, a fan, a low path. The vehicle moves in a physics engine; `gym.make_vec` with
-    `vectorization_mode="vector_entry_point"` gives thousands of the same in NumPy (`artde_gym.envs.quadrotor_batch`).
+    `vectorization_mode="vector_entry_point"` gives thousands of the same in NumPy (`artde_gym.envs.quadrotor_vector`).
 
     {shared}
     | `engine` | None | "bullet", "mujoco", None | physics engine; None: Bullet where it can be imported, else MuJoCo |
@@ -90,7 +90,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
     action_layout = task.ACTION
     observation_layout = task.OBSERVATION
     robot_name: ClassVar[str] = "q450"
-    tracking = task.TRACKING
+    metrics_spec = task.METRICS_SPEC
     fall_reasons: ClassVar[Sequence[str]] = task.FALL_REASONS
     reward_scales: ClassVar[Mapping[str, float]] = task.REWARD_SCALES
     default_disturbances: ClassVar[Mapping[str, Any]] = task.DEFAULT_DISTURBANCES
@@ -134,8 +134,8 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         camera = CAMERA._replace(target=self._home, width=width, height=height)
         self.view = View(self._engine, camera, self.control_period, SHARE, LEEWAY)
         self.metadata = {**self.metadata, **self.view.metadata}
-        self._engine.place(task.start({}, self.lift), _NO_JOINTS)
-        self._placed = self._engine.snapshot()
+        self._engine.reset(task.start({}, self.lift), _NO_JOINTS)
+        self._placed = self._engine.save_state()
         self._k, self._over = 0, True  # no step before the first reset
         self._schedule = Schedule({}, TIME_STEP)
         self._effects = Effects(1, self.words)
@@ -154,10 +154,10 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         if disturbances is not None:
             self._disturbances = task.parse(disturbances)
             warn_of_idle(self._disturbances, self._last * self.control_period)
-        super().reset(seed=seed_number("seed", seed))
-        realised = self._disturbances.draw(self.np_random)
-        self._sample(realised)
-        self._begin(realised, draw_keys(self.np_random, task.STREAMS))
+        super().reset(seed=check_seed("seed", seed))
+        sampled = self._disturbances.sample(self.np_random)
+        self._sample(sampled)
+        self._begin(sampled, draw_keys(self.np_random, task.STREAMS))
         self.view.reset()
         return self._measure(), self._info(dict.fromkeys(self.reward_scales, 0.0), (), ())
 
@@ -193,7 +193,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         path = self._plan[:, :3]
         cable = self._sling.curve()
         return self.view.picture(
-            step * TIME_STEP, self._home, pushes, self._realised, path=path, cable=cable, over=self._over
+            step * TIME_STEP, self._home, pushes, self._sampled, path=path, cable=cable, over=self._over
         )
 
     def close(self) -> None:
@@ -208,21 +208,21 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
     def schedule(self) -> Schedule:
         return self._schedule
 
-    def _begin(self, realised: Mapping[str, Any], keys: NDArray[np.uint64]) -> None:
+    def _begin(self, sampled: Mapping[str, Any], keys: NDArray[np.uint64]) -> None:
         """Set an episode up: the vehicle at rest in balance."""
         engine = self._engine
-        engine.restore(self._placed)
-        if "initial_position" in realised:
-            engine.place(task.start(realised, self.lift), _NO_JOINTS)
-        engine.scale_masses(realised.get("mass_error", {}).get("factor", 1.0))
-        self._schedule = Schedule(realised, TIME_STEP)
+        engine.restore_state(self._placed)
+        if "initial_position" in sampled:
+            engine.reset(task.start(sampled, self.lift), _NO_JOINTS)
+        engine.scale_masses(sampled.get("mass_scale", {}).get("factor", 1.0))
+        self._schedule = Schedule(sampled, TIME_STEP)
         self._schedule.start(engine)
-        self._rotors = Rotors(realised, task.hover_thrusts(realised, self.lift), TIME_STEP, self._ticks * STEPS)
+        self._rotors = Rotors(sampled, task.hover_thrusts(sampled, self.lift), TIME_STEP, self._ticks * STEPS)
         self._wrench = robot.MIXER @ self._rotors.thrusts
-        self._wind = Wind(realised["wind"], keys[0]) if "wind" in realised else None
-        self._ground_effect = realised.get("ground_effect", {}).get("strength", 0.0)
-        self._sensors.begin(0, realised, keys[1:])
-        self._effects.begin(0, realised)
+        self._wind = Wind(sampled["wind"], keys[0]) if "wind" in sampled else None
+        self._ground_effect = sampled.get("ground_effect", {}).get("strength", 0.0)
+        self._sensors.begin(0, sampled, keys[1:])
+        self._effects.begin(0, sampled)
         self._k = 0
         self._over = False
         self._pulled = 0.0
@@ -252,7 +252,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
                 if not quiet:
                     events += self._schedule.apply(first + step, engine)
                 u1, u2, u3, u4 = rows[step]
-                engine.push_base((drag_x, drag_y, drag_z + u1), (u2, u3, u4))
+                engine.apply_base_wrench((drag_x, drag_y, drag_z + u1), (u2, u3, u4))
                 load_base(engine, load, 0)
                 engine.step(_NO_JOINTS)
                 pulled += self._sling.tension
@@ -262,7 +262,7 @@ class QuadInfinityPayloadEnv(Live, gym.Env[NDArray[Any], NDArray[Any]]):
         return events
 
     def _read(self) -> None:
-        self._state = self._engine.read()
+        self._state = self._engine.state()
         self._rot = matrix(self._state.quat_xyzw)
 
     def _drag(self) -> Vector:

@@ -40,14 +40,14 @@ class Sensors:
         self._late: Array | None = None  # its last samples (SLOTS, 7, n), once a vehicle needs them
         self._keys = np.zeros((2, n), np.uint64)
 
-    def begin(self, vehicle: int, realised: Mapping[str, Any], keys: NDArray[np.uint64]) -> None:
-        """Begin an episode of one vehicle, with realised disturbances and two keys of its noise."""
+    def begin(self, vehicle: int, sampled: Mapping[str, Any], keys: NDArray[np.uint64]) -> None:
+        """Begin an episode of one vehicle, with sampled disturbances and two keys of its noise."""
         self._keys[:, vehicle] = keys
-        if self._noise is None and "sensor_noise" in realised:
+        if self._noise is None and "sensor_noise" in sampled:
             self._noise = VehicleNoise(self._n, self._dtype)
         if self._noise is not None:
-            self._noise.begin(vehicle, realised)
-        self._delay[vehicle] = realised.get("cable_delay", {}).get("samples", 0)
+            self._noise.begin(vehicle, sampled)
+        self._delay[vehicle] = sampled.get("cable_delay", {}).get("samples", 0)
         if self._late is None and self._delay[vehicle] and self._cable is not None:
             self._late = np.zeros((SLOTS, self._cable.stop - self._cable.start, self._n), self._dtype)
 

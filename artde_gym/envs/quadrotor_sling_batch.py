@@ -8,10 +8,10 @@ from typing import ClassVar
 import numpy as np
 
 from artde_gym.arrays import Array
-from artde_gym.envs.batch import Mask
 from artde_gym.envs.documentation import filled
-from artde_gym.envs.quadrotor_batch import QuadInfinityPayloadVectorEnv, square
-from artde_gym.envs.quadrotor_fleet import Fleet
+from artde_gym.envs.quadrotor_batch_sim import QuadrotorBatchSim
+from artde_gym.envs.quadrotor_vector import QuadInfinityPayloadVectorEnv, square
+from artde_gym.envs.vector import Mask
 from artde_gym.info import Columns
 from artde_gym.robots.q450 import sling, task
 
@@ -47,13 +47,13 @@ class QuadSlingPayloadVectorEnv(QuadInfinityPayloadVectorEnv):
     """
 
     observation_layout = sling.OBSERVATION
-    tracking = sling.TRACKING
+    tracking = sling.METRICS_SPEC
     fall_reasons: ClassVar[Sequence[str]] = sling.FALL_REASONS
     reward_scales = sling.REWARD_SCALES
     default_disturbances = sling.DEFAULT_DISTURBANCES
     lift = sling.LIFT
 
-    def _look(self, block: Array, fleet: Fleet) -> None:
+    def _look(self, block: Array, fleet: QuadrotorBatchSim) -> None:
         block[sling.CABLE.start :] = 0.0
         if fleet.cables is not None:
             held = fleet.cables.held
@@ -89,7 +89,7 @@ class QuadSlingPayloadVectorEnv(QuadInfinityPayloadVectorEnv):
                 terms[name][part] = values
         return terms, [*falls, touches]
 
-    def _load_error(self, part: slice, fleet: Fleet) -> Array:
+    def _load_error(self, part: slice, fleet: QuadrotorBatchSim) -> Array:
         assert fleet.cables is not None
         reference = self._plan[: task.POSITION.stop - task.POSITION.start].take(self._k[part], axis=1)
         return fleet.cables.load_error(reference)

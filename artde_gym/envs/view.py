@@ -81,7 +81,7 @@ class View:
         Args:
             home: where the robot is meant to be (m).
             pushes: that act now.
-            disturbances: of the episode, realised.
+            disturbances: of the episode, sampled.
             path: (n, 3), drawn as a line (m).
             cable: points from the hook to the payload (m), none without a cable.
             over: whether the episode has ended.
@@ -105,7 +105,7 @@ class View:
 
     def following(self, home: Vector) -> Camera:
         """Where the camera is now."""
-        position = np.asarray(self._engine.read().position)
+        position = np.asarray(self._engine.state().position)
         off = np.clip(self._share * (position - home), -self._slack, self._slack)
         x, y, _ = (position - off).tolist()
         return self.camera._replace(target=(x, y, self.camera.target[2]))
@@ -116,7 +116,7 @@ def _words(disturbances: Mapping[str, Any], time_s: float) -> list[str]:
     words = []
     for kind, values in disturbances.items():
         if kind == "payload":
-            if values["attach"] <= time_s < values["drop"]:
+            if values["attach_time"] <= time_s < values["detach_time"]:
                 words.append(f"payload {values['mass']:.2f} kg")
         elif kind == "friction":
             words.append(f"friction {values['coefficient']:.2f}")
@@ -150,7 +150,7 @@ def _arrow(picture: Image.Image, camera: Camera, point: Vector, force: Vector) -
     draw.text((x, y), f"{size:.3g} N", PUSH, font, "mm", stroke_width=2, stroke_fill="white")
 
 
-def _fill(picture: Image.Image, corners: Sequence[Array], colour: tuple[int, int, int]) -> None:
+def _fill(picture: Image.Image, corners: Sequence[Array], color: tuple[int, int, int]) -> None:
     """A polygon with smooth edges and a white rim."""
     points = [(FINER * float(x), FINER * float(y)) for x, y in corners]
     rim = Image.new("L", (FINER * picture.width, FINER * picture.height))
@@ -158,15 +158,15 @@ def _fill(picture: Image.Image, corners: Sequence[Array], colour: tuple[int, int
     body = Image.new("L", rim.size)
     ImageDraw.Draw(body).polygon(points, 255)
     picture.paste((255, 255, 255), None, rim.reduce(FINER))
-    picture.paste(colour, None, body.reduce(FINER))
+    picture.paste(color, None, body.reduce(FINER))
 
 
-def _line(picture: Image.Image, points: Array, colour: tuple[int, int, int]) -> None:
+def _line(picture: Image.Image, points: Array, color: tuple[int, int, int]) -> None:
     """A thin line through pixels (n, 2), half transparent."""
     mask = Image.new("L", (FINER * picture.width, FINER * picture.height))
     whole = np.isfinite(points).all(axis=1)
     ImageDraw.Draw(mask).line([*map(tuple, (FINER * points[whole]).tolist())], 150, FINER)
-    picture.paste(colour, None, mask.reduce(FINER))
+    picture.paste(color, None, mask.reduce(FINER))
 
 
 def _rope(picture: Image.Image, camera: Camera, points: Sequence[Vector]) -> None:

@@ -6,10 +6,10 @@ import unicodedata
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from artde_gym.disturbances import KINDS
+from artde_gym.disturbances import DISTURBANCES
 from artde_gym.disturbances.kinds import parameters_of
 from artde_gym.errors import ArtdeGymError
-from artde_gym.evaluation.environments import Backend, arguments_of, ours, robot_of
+from artde_gym.evaluation.environments import arguments_of, ours, robot_of
 
 EXACT = 2**53
 """Whole numbers below it are floats without rounding."""
@@ -43,14 +43,14 @@ def numbers(value: Any) -> Any:
 def disturbances(given: Mapping[str, Any], env_id: str) -> dict[str, Any]:
     """Write disturbances in full, with all defaults; those that no grammar knows stay as they are."""
     robot = robot_of(env_id) if env_id in ours() else None
-    written = {kind: _entries(kind, value, robot) if kind in KINDS else value for kind, value in given.items()}
+    written = {kind: _entries(kind, value, robot) if kind in DISTURBANCES else value for kind, value in given.items()}
     return {kind: numbers(value) for kind, value in written.items() if value != []}
 
 
-def arguments(given: Mapping[str, Any], env_id: str, backend: Backend) -> dict[str, Any]:
+def arguments(given: Mapping[str, Any], env_id: str, vectorized: bool) -> dict[str, Any]:
     """Write an environment's arguments without those that have their defaults, its disturbances in full."""
     try:
-        known = arguments_of(env_id, backend) if env_id in ours() else {}
+        known = arguments_of(env_id, vectorized) if env_id in ours() else {}
     except ArtdeGymError:
         known = {}
     if isinstance(given.get("disturbances"), Mapping):
@@ -64,14 +64,14 @@ def _differs(value: Any, argument: Any) -> bool:
 
 
 def _entries(kind: str, given: Any, robot: str | None) -> Any:
-    if not KINDS[kind].repeated:
+    if not DISTURBANCES[kind].multiple:
         return _full(kind, given, robot)
     entries = [given] if isinstance(given, Mapping) else given
     return [_full(kind, entry, robot) for entry in entries] if isinstance(entries, (list, tuple)) else given
 
 
 def _full(kind: str, given: Any, robot: str | None) -> dict[str, Any]:
-    known = KINDS[kind]
+    known = DISTURBANCES[kind]
     own, parameters = parameters_of(kind, given), known.parameters_for(robot)
     defaults = {one.name: known.default_of(one, robot, own) for one in parameters if one.default is not None}
     return {**defaults, **own}

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from artde_gym.errors import OptionError
 from artde_gym.evaluation import canonical
-from artde_gym.evaluation.environments import Backend, single, tracking_of, vector, with_engine
+from artde_gym.evaluation.environments import metrics_spec_of, single, vector, with_engine
 from artde_gym.evaluation.metrics import Span
 from artde_gym.scenarios import Scenario
 from artde_gym.scenarios import scenario as find_scenario
@@ -32,7 +32,7 @@ def cells_of(
     names: str | Sequence[str] | None,
     kwargs: Mapping[str, Any] | None,
     disturbances: Mapping[str, Any] | None,
-    backend: Backend = "single",
+    vectorized: bool = False,
 ) -> list[Cell]:
     """Find what to run of an environment: named scenarios, or it as it is; arguments as for `evaluate`.
 
@@ -53,11 +53,11 @@ def cells_of(
     if names is None:
         own = {} if disturbances is None else {"disturbances": disturbances}
         env_id = env_id or DEFAULT_ENVIRONMENT
-        return [Cell(CUSTOM, env_id, {**with_engine(env_id, kwargs, backend), **own})]
+        return [Cell(CUSTOM, env_id, {**with_engine(env_id, kwargs, vectorized), **own})]
     cells = []
     for entry in _scenarios(env_id, names):
         chosen = dict(entry.disturbances if disturbances is None else disturbances)
-        arguments = with_engine(entry.env_id, {**entry.kwargs, **kwargs}, backend)
+        arguments = with_engine(entry.env_id, {**entry.kwargs, **kwargs}, vectorized)
         cells.append(Cell(entry.name, entry.env_id, {**arguments, "disturbances": chosen}, entry.phases))
     return cells
 
@@ -83,7 +83,7 @@ def _mapping(field: str, value: Any, allowed: str) -> dict[str, Any]:
     return dict(value)
 
 
-def tried(backend: Backend, cell: Cell) -> Any:
+def validate_cell(vectorized: bool, cell: Cell) -> Any:
     """Build an environment for a cell, whose arguments and disturbances have then been found good.
 
     Raises:
@@ -93,8 +93,8 @@ def tried(backend: Backend, cell: Cell) -> Any:
         json.dumps(cell.kwargs)
     except TypeError as error:
         raise OptionError("env_kwargs", cell.kwargs, "values that JSON can write") from error
-    tracking_of(cell.env_id)
-    if backend == "batch":
+    metrics_spec_of(cell.env_id)
+    if vectorized:
         return vector_of(cell, 1)
     env, options = single_of(cell)
     env.reset(options=options)

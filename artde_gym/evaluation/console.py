@@ -14,11 +14,11 @@ from rich.table import Table
 from rich.text import Text
 
 from artde_gym.evaluation import statistics, thesis
-from artde_gym.evaluation.environments import tracking_of
+from artde_gym.evaluation.environments import metrics_spec_of
 from artde_gym.evaluation.registered import METRICS
 from artde_gym.evaluation.result import Result
+from artde_gym.metrics_spec import MetricsSpec
 from artde_gym.scenarios import SCENARIOS
-from artde_gym.tracking import Tracking
 
 UNITS = {"deg": ("deg", 3), "m": ("m", 4), "nm": ("Nm", 3), "n": ("N", 3)}
 """Unit in a column's name -> how it is written, and with how many digits."""
@@ -95,7 +95,7 @@ class _Tables:
         if table := thesis.reported(reference).table:
             note += f"; thesis: {table}"
         parts: list[RenderableType] = [title, Text(note, style="dim"), self._falls(scenario, reference)]
-        tracking = tracking_of(pd.concat(rows)["env"].iloc[0])
+        tracking = metrics_spec_of(pd.concat(rows)["env"].iloc[0])
         own = [name for name in METRICS if name in self._result.metrics]
         for metric, what, axes in measured(tracking, () if entry is None else entry.phases, own):
             parts += self._metric(scenario, reference, metric, what, axes)
@@ -153,7 +153,7 @@ class _Tables:
         pairs = [self._rivals[i : i + TOGETHER] for i in range(0, len(self._rivals), TOGETHER)]
         return [table(self._controllers, []), *(table([], pair) for pair in pairs)]
 
-    def _events(self, scenario: str, tracking: Tracking) -> list[Table]:
+    def _events(self, scenario: str, tracking: MetricsSpec) -> list[Table]:
         """Peak and recovery after each disturbance; the median counts a recovery that never came as the longest."""
         unit, (text, digits) = tracking.errors[0].unit, UNITS[tracking.errors[0].unit]
         table = _table("after", "", title="after disturbances")
@@ -173,7 +173,7 @@ class _Tables:
 
 
 def measured(
-    tracking: Tracking, phases: Sequence[tuple[float, float]], registered: Sequence[str] = ()
+    tracking: MetricsSpec, phases: Sequence[tuple[float, float]], registered: Sequence[str] = ()
 ) -> list[tuple[str, str, list[str]]]:
     """Metrics to show, their titles and axes: each phase by itself where the scenario has phases.
 

@@ -12,10 +12,10 @@ import gymnasium as gym
 from gymnasium.envs.registration import load_env_creator
 from gymnasium.vector import AutoresetMode
 
-from artde_gym.errors import OptionError, among
+from artde_gym.errors import OptionError, suggest_names
 from artde_gym.kit import ROBOTS
+from artde_gym.metrics_spec import MetricsSpec
 from artde_gym.sim.factory import ENGINES, resolve_engine
-from artde_gym.tracking import Tracking
 
 Backend = Literal["single", "batch"]
 """One environment for each episode in a physics engine, or many episodes in one vector environment."""
@@ -26,25 +26,25 @@ PICTURES = ("width", "height", "render_mode")
 KEPT = 4  # environments a process; each one holds a physics client
 
 
-def arguments_of(env_id: str, backend: Backend = "single") -> Mapping[str, inspect.Parameter]:
+def arguments_of(env_id: str, vectorized: bool = False) -> Mapping[str, inspect.Parameter]:
     """Arguments of an environment by name, the number of environments in a vector excepted.
 
     Raises:
         gymnasium.error.Error: if there is no such environment.
         OptionError: if it has no vector environment of its own and the backend needs one.
     """
-    known = dict(inspect.signature(load_env_creator(_entry_point(env_id, backend))).parameters)
+    known = dict(inspect.signature(load_env_creator(_entry_point(env_id, vectorized))).parameters)
     known.pop("num_envs", None)
     return known
 
 
-def tracking_of(env_id: str) -> Tracking:
+def metrics_spec_of(env_id: str) -> MetricsSpec:
     """What an environment of this project tracks.
 
     Raises:
         OptionError: for any other environment.
     """
-    return _class(env_id).tracking
+    return _class(env_id).metrics_spec
 
 
 def robot_of(env_id: str) -> str:
@@ -56,19 +56,19 @@ def robot_of(env_id: str) -> str:
     return _class(env_id).robot_name
 
 
-def with_engine(env_id: str, kwargs: Mapping[str, Any], backend: Backend = "single") -> dict[str, Any]:
+def with_engine(env_id: str, kwargs: Mapping[str, Any], vectorized: bool = False) -> dict[str, Any]:
     """Return arguments of an environment with the engine that it will run in, so that records say which one it was.
 
     Raises:
         OptionError: for an unknown engine.
     """
-    known = arguments_of(env_id, backend).get("engine")
+    known = arguments_of(env_id, vectorized).get("engine")
     if known is None:
         return dict(kwargs)
     given = kwargs.get("engine", known.default)
-    if backend == "single":
+    if not vectorized:
         return {**kwargs, "engine": resolve_engine(given)}
-    creator: Any = load_env_creator(_entry_point(env_id, backend))
+    creator: Any = load_env_creator(_entry_point(env_id, vectorized))
     return {**kwargs, "engine": getattr(creator, "own_engine", None) if given is None else given}
 
 
@@ -96,7 +96,7 @@ def single(env_id: str, arguments: str) -> Any:
     Raises:
         OptionError: for an unknown argument, or as the environment itself.
     """
-    return gym.make(env_id, disable_env_checker=True, **_checked(env_id, arguments, "single"))
+    return gym.make(env_id, disable_env_checker=True, **_checked(env_id, arguments, False))
 
 
 def vector(env_id: str, arguments: str, size: int) -> Any:
@@ -105,8 +105,8 @@ def vector(env_id: str, arguments: str, size: int) -> Any:
     Raises:
         OptionError: as of `single`, or for an environment that has no vector of its own.
     """
-    given = _checked(env_id, arguments, "batch")
-    creator: Any = load_env_creator(_entry_point(env_id, "batch"))
+    given = _checked(env_id, arguments, True)
+    creator: Any = load_env_creator(_entry_point(env_id, True))
     if hasattr(creator, "own_engine"):
         given = {"engine": creator.own_engine, "autoreset_mode": AutoresetMode.DISABLED, **given}
     return gym.make_vec(env_id, size, vectorization_mode="vector_entry_point", **given)
@@ -123,24 +123,24 @@ def drawing(env_id: str, kwargs: Mapping[str, Any], width: int) -> Any:
 
 
 def _class(env_id: str) -> Any:
-    creator: Any = load_env_creator(_entry_point(env_id, "single"))
-    if not hasattr(creator, "tracking"):
+    creator: Any = load_env_creator(_entry_point(env_id, False))
+    if not hasattr(creator, "metrics_spec"):
         raise OptionError("env_id", env_id, "an environment of artde_gym")
     return creator
 
 
-def _checked(env_id: str, arguments: str, backend: Backend) -> dict[str, Any]:
-    known, given = arguments_of(env_id, backend), json.loads(arguments)
+def _checked(env_id: str, arguments: str, vectorized: bool) -> dict[str, Any]:
+    known, given = arguments_of(env_id, vectorized), json.loads(arguments)
     known = {name: argument for name, argument in known.items() if name != "render_mode"}  # asked for by `drawing`
     for name in given:
         if name not in known:
-            raise OptionError(f"argument of {env_id}", name, among(name, known))
+            raise OptionError(f"argument of {env_id}", name, suggest_names(name, known))
     return given
 
 
-def _entry_point(env_id: str, backend: Backend) -> str:
+def _entry_point(env_id: str, vectorized: bool) -> str:
     spec = gym.spec(env_id)
-    if backend == "single":
+    if not vectorized:
         return str(spec.entry_point)
     if spec.vector_entry_point is None:
         able = [name for name in ours() if gym.spec(name).vector_entry_point]

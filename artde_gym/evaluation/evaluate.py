@@ -9,7 +9,6 @@ from typing import Any
 
 import pandas as pd
 
-from artde_gym.evaluation.environments import Backend
 from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.plan import Plan
 from artde_gym.evaluation.result import Result
@@ -33,9 +32,9 @@ def evaluate(
     disturbances: Mapping[str, Any] | None = None,
     env_kwargs: Mapping[str, Any] | None = None,
     gains: Mapping[str, Mapping[str, Any]] | None = None,
-    backend: Backend = "single",
-    traced: int | None = None,
-    trace_hz: float = 100.0,
+    vectorized: bool = False,
+    record_episodes: int | None = None,
+    record_hz: float = 100.0,
     allow_mixed: bool = False,
     on_progress: Callable[[Update], None] | None = None,
 ) -> Result:
@@ -53,11 +52,11 @@ def evaluate(
         disturbances: in place of the scenario's or the environment's own.
         env_kwargs: arguments of the environment, on top of the scenario's.
         gains: controller name -> gains in place of its preset's.
-        backend: "single" for one environment an episode; "batch" for a vector of them in chunks of `CHUNK` episodes,
+        vectorized: "single" for one environment an episode; "batch" for a vector of them in chunks of `CHUNK` episodes,
             which takes an environment with a vector form of its own. Both draw the same disturbances from a seed.
-        traced: how many episodes of each controller and scenario leave signals in the folder; None for all of them, or
+        record_episodes: how many episodes of each controller and scenario leave signals in the folder; None for all of them, or
             none in the batch backend.
-        trace_hz: rate of stored signals; infinite for all of them.
+        record_hz: rate of stored signals; infinite for all of them.
         allow_mixed: continue a folder whose episodes other software ran (versions, source code, weights of controllers,
             code of the user's own); its provenance then says so.
         on_progress: called about once a simulated second of each running episode or chunk, and at its end.
@@ -79,9 +78,9 @@ def evaluate(
         disturbances=disturbances,
         env_kwargs=env_kwargs,
         gains=gains,
-        backend=backend,
-        traced=traced,
-        trace_hz=trace_hz,
+        vectorized=vectorized,
+        record_episodes=record_episodes,
+        record_hz=record_hz,
         allow_mixed=allow_mixed,
     )
     return run_plan(plan, out, on_progress)

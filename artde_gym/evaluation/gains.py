@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import Any
 
-from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.registration import ControllerSpec, make_controller, register_spec
 
@@ -23,7 +23,7 @@ def checked_gains(gains: Any, named: Collection[str]) -> dict[str, dict[str, Any
         raise OptionError("gains", gains, "a mapping of controllers to mappings of their gains")
     for name, values in gains.items():
         if name not in named:
-            raise UnknownNameError("gains", name, among(name, named))
+            raise UnknownNameError("gains", name, suggest_names(name, named))
         if not (isinstance(values, Mapping) and all(isinstance(gain, str) for gain in values)):
             raise OptionError(f"gains of {name!r}", values, "a mapping of its gains")
     return {name: dict(values) for name, values in gains.items()}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from artde_gym.evaluation import canonical
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.registration import ControllerSpec, registered_controllers
@@ -49,7 +49,7 @@ def named_controllers(controllers: Any) -> dict[str, Policy | ControllerSpec]:
     for label, item in labelled(controllers).items():
         if isinstance(item, str):
             if item not in known:
-                raise UnknownNameError("controller", item, among(item, known))
+                raise UnknownNameError("controller", item, suggest_names(item, known))
             named[label] = known[item]
         elif hasattr(item, "predict"):
             named[label] = item

@@ -1,6 +1,6 @@
 """Numbers of episodes, from their signals as time goes on: no more than a block of samples has to be in memory.
 
-Columns by what `Tracking` declares; u is the unit of a tracked error, and the first one tracked is the main one.
+Columns by what `MetricsSpec` declares; u is the unit of a tracked error, and the first one tracked is the main one.
 
 Per axis: `rmse_u_<axis>`, `max_abs_error_u_<axis>`, and for each effort `rms_<effort>_<unit>_<axis>`; the same with
 `_phase1_<axis>`, ... for each phase, NaN for a part that the episode did not reach. Per episode:
@@ -39,7 +39,7 @@ from artde_gym.disturbances.kinds import NEVER
 from artde_gym.errors import OptionError
 from artde_gym.evaluation.registered import METRICS, Metric
 from artde_gym.layout import Layout
-from artde_gym.tracking import Fields, Tracked, Tracking, Watched
+from artde_gym.metrics_spec import Fields, MetricsSpec, TrackedSignal, Watched
 
 GRAVITY = 9.81  # m/s^2
 BEFORE = 2.0  # s before a disturbance, whose largest error counts as recovered too
@@ -59,16 +59,16 @@ def events_of(disturbances: Mapping[str, Any]) -> dict[str, Span]:
         f"{PUSH}{i}": (push["start"], push["start"] + push["duration"])
         for i, push in enumerate(disturbances.get("push", ()))
     }
-    payload = disturbances.get("payload", {"attach": 0.0, "drop": NEVER})
-    if payload["attach"] < payload["drop"] < NEVER:
-        events["drop"] = (payload["drop"], payload["drop"])
+    payload = disturbances.get("payload", {"attach_time": 0.0, "detach_time": NEVER})
+    if payload["attach_time"] < payload["detach_time"] < NEVER:
+        events["drop"] = (payload["detach_time"], payload["detach_time"])
     return events
 
 
 def payload_of(disturbances: Mapping[str, Any]) -> tuple[float, Span]:
     """Mass (kg) of the payload, and (begin, end) (s) of when it is there, if it ever is."""
-    payload = disturbances.get("payload", {"mass": 0.0, "attach": 0.0, "drop": 0.0})
-    return payload["mass"], (payload["attach"], max(payload["attach"], payload["drop"]))
+    payload = disturbances.get("payload", {"mass": 0.0, "attach_time": 0.0, "detach_time": 0.0})
+    return payload["mass"], (payload["attach_time"], max(payload["attach_time"], payload["detach_time"]))
 
 
 class Metrics:
@@ -86,7 +86,7 @@ class Metrics:
 
     def __init__(
         self,
-        tracking: Tracking,
+        tracking: MetricsSpec,
         layout: Layout,
         period: float,
         masses: Sequence[float],
@@ -99,8 +99,8 @@ class Metrics:
         loads = payloads or [(0.0, (0.0, 0.0))] * len(masses)
         self._loads = np.array([mass for mass, _ in loads])
         self._carried = np.array([[_sample(time, period) for time in span] for _, span in loads]).T
-        box, part = layout.box(), layout[tracking.limited]
-        near = tracking.near * (box.high - box.low)[part]
+        box, part = layout.box(), layout[tracking.saturated_field]
+        near = tracking.saturation_margin * (box.high - box.low)[part]
         self._limits = box.low[part] + near, box.high[part] - near
         n = len(events)
         spans = {"": (0.0, np.inf)} | {f"phase{i}_": span for i, span in enumerate(phases, start=1)}
@@ -110,12 +110,14 @@ class Metrics:
         self._errors = {prefix: [_Squares(n) for _ in tracking.errors] for prefix in spans}
         self._efforts = {prefix: [_Squares(n) for _ in tracking.efforts] for prefix in spans}
         self._size, self._sigmas = _Squares(n), {column: _Squares(n) for column in tracking.tde_errors}
-        self._means = {column: _Mean(n) for column in tracking.means}
+        self._means = {column: _Mean(n) for column in tracking.diagnostic_means}
         self._variations = [_Variation(n) for _ in tracking.efforts]
         self._iae, self._itae, self._saturated, self._energy, self._distance, self._carrying = np.zeros((6, n))
         names = dict.fromkeys(name for one in events for name in one)
         never = (np.inf, np.inf)
-        self._events = {name: _Event([one.get(name, never) for one in events], tracking.band, period) for name in names}
+        self._events = {
+            name: _Event([one.get(name, never) for one in events], tracking.settling_band, period) for name in names
+        }
         self._watched = [_Watched(watched, events, period) for watched in tracking.watched]
         self._registered = [_Registered(metric, n) for metric in METRICS.values()]
         self._count = np.zeros(n, dtype=np.int64)  # samples of each episode so far
@@ -133,7 +135,7 @@ class Metrics:
         """
         tracking = self._tracking
         live = None if live is None or live.all() else live
-        samples = len(fields[tracking.limited])
+        samples = len(fields[tracking.saturated_field])
         self._count += samples if live is None else samples * live
         for number, tracked in enumerate(tracking.errors):
             error = _error(tracked, fields, diagnostics)
@@ -150,7 +152,7 @@ class Metrics:
             self._variations[number].add(force[_part(1, END, start)], live)
         acted = _part(1, END, start)  # what the first observation tells of acted before this episode
         low, high = self._limits
-        values = fields[tracking.limited][acted]
+        values = fields[tracking.saturated_field][acted]
         self._saturated = _added(self._saturated, np.any((values <= low) | (values >= high), axis=-1), live)
         self._energy = _added(self._energy, tracking.power(fields)[acted], live)
         if tracking.speed is not None:
@@ -160,7 +162,7 @@ class Metrics:
         for column, name in tracking.tde_errors.items():
             if diagnostics is not None and name in diagnostics:
                 self._sigmas[column].add(diagnostics[name], live)
-        for column, name in tracking.means.items():
+        for column, name in tracking.diagnostic_means.items():
             if diagnostics is not None and name in diagnostics:
                 self._means[column].add(diagnostics[name], live)
         for watched in self._watched:
@@ -397,7 +399,7 @@ class _Event:
         return np.where(self._recovered < 0, time, self._period * (self._recovered - self._end))
 
 
-def _error(tracked: Tracked, fields: Fields, diagnostics: Fields | None) -> Array | None:
+def _error(tracked: TrackedSignal, fields: Fields, diagnostics: Fields | None) -> Array | None:
     if tracked.diagnostic is None:
         return tracked.error(fields)
     if diagnostics is None:

@@ -13,10 +13,9 @@ import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, get_args
 
-from artde_gym.arguments import number, whole
-from artde_gym.errors import OptionError, among
-from artde_gym.evaluation.cells import Cell, cells_of, tried
-from artde_gym.evaluation.environments import Backend
+from artde_gym.arguments import check_integer, check_number
+from artde_gym.errors import OptionError, suggest_names
+from artde_gym.evaluation.cells import Cell, cells_of, validate_cell
 from artde_gym.evaluation.gains import checked_gains, policy_for
 from artde_gym.evaluation.identity import Identity, behind, identity_of
 from artde_gym.evaluation.labels import named_controllers
@@ -42,9 +41,9 @@ class Plan:
         episodes: of each controller in each cell.
         seed: from which those of the episodes are derived.
         workers: processes.
-        backend: as for `evaluate`.
-        traced: how many episodes of each controller and cell leave signals; None for what the backend is used to.
-        trace_hz: rate of stored signals; infinite for all of them.
+        vectorized: as for `evaluate`.
+        record_episodes: how many episodes of each controller and cell leave signals; None for what the backend is used to.
+        record_hz: rate of stored signals; infinite for all of them.
         allow_mixed: whether results of other software may be continued.
     """
 
@@ -54,9 +53,9 @@ class Plan:
     episodes: int
     seed: int
     workers: int
-    backend: Backend
-    traced: int | None
-    trace_hz: float
+    vectorized: bool
+    record_episodes: int | None
+    record_hz: float
     allow_mixed: bool
 
     @classmethod
@@ -72,9 +71,9 @@ class Plan:
         disturbances: Mapping[str, Any] | None = None,
         env_kwargs: Mapping[str, Any] | None = None,
         gains: Mapping[str, Mapping[str, Any]] | None = None,
-        backend: Backend = "single",
-        traced: int | None = None,
-        trace_hz: float = 100.0,
+        vectorized: bool = False,
+        record_episodes: int | None = None,
+        record_hz: float = 100.0,
         allow_mixed: bool = False,
     ) -> Plan:
         """Make a plan from what `evaluate` takes; see there for the arguments.
@@ -83,19 +82,23 @@ class Plan:
             UnknownNameError, OptionError: for a bad argument.
         """
         check_workers(workers)
-        whole("episodes", episodes, 1, MOST_EPISODES)
-        whole("seed", seed, 0)
-        number("trace_hz", trace_hz, SLOWEST, math.inf, f"a number >= {SLOWEST:g} (Hz), infinite for every sample")
-        if backend not in get_args(Backend):
-            raise OptionError("backend", backend, among(backend, get_args(Backend)))
-        if traced is not None:
-            whole("traced", traced, 0)
+        check_integer("episodes", episodes, 1, MOST_EPISODES)
+        check_integer("seed", seed, 0)
+        check_number(
+            "record_hz", record_hz, SLOWEST, math.inf, f"a number >= {SLOWEST:g} (Hz), infinite for every sample"
+        )
+        if vectorized not in get_args(Backend):
+            raise OptionError("vectorized", vectorized, suggest_names(vectorized, get_args(Backend)))
+        if record_episodes is not None:
+            check_integer("record_episodes", record_episodes, 0)
         named = named_controllers(controllers)
         own_gains = checked_gains(gains, named)
-        cells = tuple(cells_of(env_id, scenario, env_kwargs, disturbances, backend))
+        cells = tuple(cells_of(env_id, scenario, env_kwargs, disturbances, vectorized))
         if workers > 1:
             check_picklable(named, own_gains)
-        return cls(named, cells, own_gains, episodes, seed, workers, backend, traced, trace_hz, allow_mixed)
+        return cls(
+            named, cells, own_gains, episodes, seed, workers, vectorized, record_episodes, record_hz, allow_mixed
+        )
 
     @property
     def total(self) -> int:
@@ -105,9 +108,9 @@ class Plan:
     @property
     def traces(self) -> int:
         """Number of episodes of each controller and cell that leave signals."""
-        if self.traced is not None:
-            return self.traced
-        return self.episodes if self.backend == "single" else 0
+        if self.record_episodes is not None:
+            return self.record_episodes
+        return self.episodes if not self.vectorized else 0
 
     def only(self, names: Collection[str], cell: Cell) -> Plan:
         """Return the plan for some of the controllers in one cell."""
@@ -123,9 +126,9 @@ class Plan:
             "gains": self.gains,
             "episodes": self.episodes,
             "seed": self.seed,
-            "backend": self.backend,
-            "traced": self.traces,
-            "trace_hz": self.trace_hz if math.isfinite(self.trace_hz) else "all",
+            "vectorized": self.vectorized,
+            "record_episodes": self.traces,
+            "record_hz": self.record_hz if math.isfinite(self.record_hz) else "all",
             **({"metrics": sorted(METRICS)} if METRICS else {}),
         }
 
@@ -148,7 +151,7 @@ class Plan:
         """
         found: dict[str, str] = {}
         for cell in self.cells:
-            env = tried(self.backend, cell)
+            env = validate_cell(self.vectorized, cell)
             for name, item in self.controllers.items():
                 found |= behind(name, cell.env_id, item, policy_for(item, env, self.gains.get(name, {})))
         return found
@@ -159,4 +162,6 @@ class Plan:
             Case(cell, name, item, self.gains.get(name, {}), self.seed)
             for cell, (name, item) in itertools.product(self.cells, self.controllers.items())
         ]
-        return tasks_of(cases, self.episodes, self.backend, done, traced=self.traces, trace_hz=self.trace_hz)
+        return tasks_of(
+            cases, self.episodes, self.vectorized, done, record_episodes=self.traces, record_hz=self.record_hz
+        )

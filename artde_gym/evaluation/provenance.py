@@ -13,7 +13,7 @@ from importlib import metadata, util
 from pathlib import Path
 from typing import Any
 
-from artde_gym.arguments import reading
+from artde_gym.arguments import wrap_read_errors
 from artde_gym.errors import StoreError
 
 PACKAGES = (
@@ -68,7 +68,9 @@ def continued(
     """
     if before is None:
         return now
-    with reading("provenance of the results", folder, "a record as it was written; or a new folder", StoreError):
+    with wrap_read_errors(
+        "provenance of the results", folder, "a record as it was written; or a new folder", StoreError
+    ):
         mixed, differences = list(before.get(MIXED, [])), _differences(before, now)
     for what, (old, new) in differences.items():
         if not allow_mixed:

@@ -7,11 +7,11 @@ import re
 from collections.abc import Callable, Iterable
 from typing import Any, Literal, get_args
 
-from artde_gym.arguments import word
+from artde_gym.arguments import check_choice
 from artde_gym.arrays import Array
-from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.errors import OptionError, UnknownNameError, suggest_names
+from artde_gym.metrics_spec import Fields
 from artde_gym.registry import Registry
-from artde_gym.tracking import Fields
 
 TAKEN = (
     "cell", "controller", "duration_s", "env", "episode", "fall_reason", "fall_rate", "fell", "point", "reward",
@@ -50,7 +50,7 @@ class Metric:
             raise OptionError("name of a metric", self.name, "small letters, digits and underscores")
         if self.name in TAKEN:
             raise OptionError("name of a metric", self.name, f"a new name; these are taken: {', '.join(TAKEN)}")
-        word("reduction", self.reduction, get_args(Reduction))
+        check_choice("reduction", self.reduction, get_args(Reduction))
 
 
 METRICS: Registry[Metric] = Registry("metric", "artde_gym.metrics", lambda metric: {_checked(metric).name: metric})
@@ -78,7 +78,7 @@ def require_metrics(names: Iterable[str]) -> None:
     for name in names:
         if name not in METRICS:
             place = "register it where the script is imported, above `if __name__ == '__main__':`, or by an entry point"
-            raise UnknownNameError("metric in a worker process", name, f"{among(name, METRICS)}; {place}")
+            raise UnknownNameError("metric in a worker process", name, f"{suggest_names(name, METRICS)}; {place}")
 
 
 def _checked(loaded: Any) -> Metric:

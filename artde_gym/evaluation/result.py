@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from artde_gym.arrays import Array
-from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from artde_gym.evaluation import statistics
 from artde_gym.evaluation.pairing import DRAWN, episode_key, paired
 from artde_gym.evaluation.wide_table import WideTable
@@ -137,7 +137,7 @@ class Result:
         """
         for name in (first, second):
             if name not in self.controllers:
-                raise UnknownNameError("controller", name, among(name, self.controllers))
+                raise UnknownNameError("controller", name, suggest_names(name, self.controllers))
         lines = []
         for scenario in self.scenarios:
             mine, theirs = paired(*(self.rows(scenario, name) for name in (first, second)))

@@ -37,7 +37,7 @@ def run_episode(
     seed: int,
     *,
     options: dict[str, Any] | None = None,
-    trace_hz: float = 100.0,
+    record_hz: float = 100.0,
     phases: Sequence[Span] = (),
     on_progress: Callable[[float], None] | None = None,
 ) -> Episode:
@@ -47,13 +47,13 @@ def run_episode(
         env: an environment of this project, wrapped or not.
         seed: of the reset; the same seed has the same disturbances whatever the policy.
         options: of the reset.
-        trace_hz: rate of the traces, at most the control rate; infinite for every sample.
+        record_hz: rate of the traces, at most the control rate; infinite for every sample.
         phases: see `Metrics`.
         on_progress: called with the simulated time (s) about once a simulated second.
     """
     plant = env.unwrapped
     period: float = plant.control_period
-    stride = max(1, round(1.0 / (trace_hz * period)))
+    stride = max(1, round(1.0 / (record_hz * period)))
     report_every = max(1, round(PROGRESS_INTERVAL / period))
     diagnose = getattr(policy, "diagnostics", None)
     looks = diagnosed_every(plant, stride)
@@ -96,20 +96,20 @@ def run_episode(
 
 def diagnosed_every(plant: Any, stride: int) -> int:
     """How many control periods lie between two looks at a policy's inside, for metrics and for traces of a stride."""
-    return 1 if plant.tracking.diagnosed else stride
+    return 1 if plant.metrics_spec.diagnosed else stride
 
 
 def told_every(plant: Any, stride: int) -> int:
     """How many control periods lie between two looks at `info`, likewise."""
-    return 1 if plant.tracking.watched else stride
+    return 1 if plant.metrics_spec.watched else stride
 
 
 def metrics_for(plant: Any, disturbances: Sequence[Mapping[str, Any]], phases: Sequence[Span]) -> Metrics:
-    """Metrics of episodes in an environment, from the realised disturbances of each."""
-    masses = [plant.nominal_robot.mass * one.get("mass_error", {}).get("factor", 1.0) for one in disturbances]
+    """Metrics of episodes in an environment, from the sampled disturbances of each."""
+    masses = [plant.nominal_robot.mass * one.get("mass_scale", {}).get("factor", 1.0) for one in disturbances]
     payloads = [payload_of(one) for one in disturbances]
     events = [events_of(one) for one in disturbances]
-    return Metrics(plant.tracking, plant.observation_layout, plant.control_period, masses, events, phases, payloads)
+    return Metrics(plant.metrics_spec, plant.observation_layout, plant.control_period, masses, events, phases, payloads)
 
 
 def row_of(
@@ -148,7 +148,7 @@ def copied(signals: Mapping[str, Any]) -> dict[str, Array]:
 
 
 def _told(plant: Any, info: dict[str, Any]) -> dict[str, Array]:
-    return {name: np.array(info[name]) for name in plant.tracking.told}
+    return {name: np.array(info[name]) for name in plant.metrics_spec.recorded_info}
 
 
 def _part(signals: dict[str, Array], part: Any) -> dict[str, Array]:
@@ -156,7 +156,7 @@ def _part(signals: dict[str, Array], part: Any) -> dict[str, Array]:
 
 
 def _flatten(disturbances: dict[str, Any]) -> dict[str, Any]:
-    """Realised values as columns: payload.mass, push.0.magnitude, ..."""
+    """Sampled values as columns: payload.mass, push.0.magnitude, ..."""
     columns: dict[str, Any] = {}
 
     def visit(path: str, value: Any) -> None:

@@ -24,7 +24,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from artde_gym.arguments import file_name, reading
+from artde_gym.arguments import check_file_name, wrap_read_errors
 from artde_gym.errors import OptionError, StoreError
 from artde_gym.evaluation.lock import is_empty
 from artde_gym.evaluation.provenance import MIXED, continued
@@ -56,7 +56,7 @@ class Store:
         self.folder = folder
         self._configuration = plain_configuration(configuration)
         for name in configuration["controllers"]:
-            file_name("name of a controller", name)  # of its traces
+            check_file_name("name of a controller", name)  # of its traces
         before = claim(self.folder, RECORD, self._configuration)
         self.rows = [] if before is None else self._read_rows()
         self._columns = list(self.rows[0]) if self.rows else []
@@ -135,7 +135,7 @@ def read_episodes(folder: Path) -> tuple[str, pd.DataFrame]:
         StoreError: if it is damaged.
     """
     path = folder / TABLE
-    with reading(TABLE, path, _UNDAMAGED, StoreError):
+    with wrap_read_errors(TABLE, path, _UNDAMAGED, StoreError):
         text = path.read_text(encoding="utf-8") if path.exists() else ""
         whole = text[: text.rfind("\n") + 1]
         if not whole:
@@ -143,7 +143,7 @@ def read_episodes(folder: Path) -> tuple[str, pd.DataFrame]:
         frame = parse_table(whole, _WORDS)
         for name in KEY[:2]:
             for value in frame[name].unique():
-                file_name(name, value)
+                check_file_name(name, value)
         for name, kind in {"episode": "iu", "seed": "iu", "fell": "b", "duration_s": "fiu"}.items():
             if frame[name].dtype.kind not in kind:
                 raise ValueError(f"{name} is no column of its kind")
@@ -218,7 +218,7 @@ def claim(folder: Path, record: str, configuration: Mapping[str, Any]) -> Mappin
     """
     path = folder / record
     if path.exists():
-        with reading("output folder", folder, f"a folder whose {record} can be read", StoreError):
+        with wrap_read_errors("output folder", folder, f"a folder whose {record} can be read", StoreError):
             content = json.loads(path.read_text(encoding="utf-8"))
             found, before = dict(content["configuration"]), dict(content.get("provenance", {}))
         if found != configuration:

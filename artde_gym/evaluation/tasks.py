@@ -6,13 +6,12 @@ import itertools
 from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import Any, NamedTuple
 
-from artde_gym.evaluation.batch import run_batch
 from artde_gym.evaluation.cells import Cell, single_of, vector_of
-from artde_gym.evaluation.environments import Backend
 from artde_gym.evaluation.gains import policy_for
 from artde_gym.evaluation.registered import METRICS, require_metrics
 from artde_gym.evaluation.rollout import Episode, Policy, run_episode
 from artde_gym.evaluation.seeds import episode_seed
+from artde_gym.evaluation.vector_rollout import run_vector
 from artde_gym.registration import ControllerSpec
 
 CHUNK = 2500
@@ -30,20 +29,20 @@ class Case(NamedTuple):
 
 
 class Task(NamedTuple):
-    """Episodes of one controller that run at once: a single one, or a chunk. The first `traced` leave traces.
+    """Episodes of one controller that run at once: a single one, or a chunk. The first `record_episodes` leave traces.
 
     `metrics` are the registered ones that the process must know.
     """
 
-    backend: Backend
+    vectorized: bool
     cell: Cell
     controller: str
     policy: Policy | ControllerSpec
     gains: dict[str, Any]
     episodes: list[int]
     seeds: list[int]
-    trace_hz: float
-    traced: int
+    record_hz: float
+    record_episodes: int
     metrics: tuple[str, ...] = ()
 
 
@@ -87,36 +86,47 @@ class Progress:
 def tasks_of(
     cases: Collection[Case],
     episodes: int,
-    backend: Backend,
+    vectorized: bool,
     done: Collection[tuple[str, str, int]],
     *,
-    traced: int = 0,
-    trace_hz: float = 100.0,
+    record_episodes: int = 0,
+    record_hz: float = 100.0,
 ) -> Iterator[Task]:
     """Portion out the episodes of all cases, chunk by chunk, so that an interruption leaves whole comparisons behind.
 
     Args:
         cases: what is run; no two have both the cell's name and the controller in common.
         episodes: of each case.
-        backend: of all of them.
+        vectorized: of all of them.
         done: cell's name, controller and number of the episodes that are left out.
-        traced: the first so many episodes of each case leave traces.
-        trace_hz: rate of the traces.
+        record_episodes: the first so many episodes of each case leave traces.
+        record_hz: rate of the traces.
     """
-    for chunk in chunks_of(episodes, 1 if backend == "single" else CHUNK):
+    for chunk in chunks_of(episodes, 1 if not vectorized else CHUNK):
         for case in cases:
             left = [episode for episode in chunk if (case.cell.name, case.controller, episode) not in done]
             if left:
-                yield task_of(case, left, backend, traced=traced, trace_hz=trace_hz)
+                yield task_of(case, left, vectorized, record_episodes=record_episodes, record_hz=record_hz)
 
 
-def task_of(case: Case, episodes: Iterable[int], backend: Backend, *, traced: int = 0, trace_hz: float = 100.0) -> Task:
+def task_of(
+    case: Case, episodes: Iterable[int], vectorized: bool, *, record_episodes: int = 0, record_hz: float = 100.0
+) -> Task:
     """Put some episodes of a case into one task."""
     numbers = list(episodes)
     seeds = [episode_seed(case.seed, episode) for episode in numbers]
-    shown = sum(episode < traced for episode in numbers)
+    shown = sum(episode < record_episodes for episode in numbers)
     return Task(
-        backend, case.cell, case.controller, case.policy, case.gains, numbers, seeds, trace_hz, shown, tuple(METRICS)
+        vectorized,
+        case.cell,
+        case.controller,
+        case.policy,
+        case.gains,
+        numbers,
+        seeds,
+        record_hz,
+        shown,
+        tuple(METRICS),
     )
 
 
@@ -130,15 +140,15 @@ def chunks_of(episodes: int, size: int) -> list[range]:
 def run_task(task: Task, on_progress: Callable[[float], None]) -> list[Episode]:
     """Run the episodes of a task; `on_progress` is called with the simulated time (s)."""
     require_metrics(task.metrics)
-    options: dict[str, Any] = {"trace_hz": task.trace_hz, "phases": task.cell.phases, "on_progress": on_progress}
-    if task.backend == "batch":
+    options: dict[str, Any] = {"record_hz": task.record_hz, "phases": task.cell.phases, "on_progress": on_progress}
+    if task.vectorized:
         env = vector_of(task.cell, len(task.seeds))
         policy = policy_for(task.policy, env, task.gains)
-        return run_batch(env, policy, task.seeds, traced=task.traced, **options)
+        return run_vector(env, policy, task.seeds, record_episodes=task.record_episodes, **options)
     env, reset_options = single_of(task.cell)
     policy = policy_for(task.policy, env, task.gains)
     results = [run_episode(env, policy, seed, options=reset_options, **options) for seed in task.seeds]
-    return [result if i < task.traced else Episode(result.row, {}) for i, result in enumerate(results)]
+    return [result if i < task.record_episodes else Episode(result.row, {}) for i, result in enumerate(results)]
 
 
 def labels_of(task: Task, number: int) -> dict[str, Any]:

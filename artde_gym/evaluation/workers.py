@@ -20,7 +20,7 @@ from multiprocessing import connection
 from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any
 
-from artde_gym.arguments import whole
+from artde_gym.arguments import check_integer
 from artde_gym.errors import OptionError, WorkerError
 
 AHEAD = 2
@@ -164,7 +164,7 @@ def check_workers(workers: Any) -> None:
         OptionError: unless it is a whole number from 1 to `MOST_WORKERS`.
     """
     end_unguarded()
-    whole("workers", workers, 1, MOST_WORKERS)
+    check_integer("workers", workers, 1, MOST_WORKERS)
 
 
 def end_unguarded() -> None:

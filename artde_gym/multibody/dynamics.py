@@ -5,7 +5,7 @@ link's origin:
 
     M(q) dv/dt + h(q, v) = [wrench on the base; tau]
 
-Every sum runs over the moving links b with Jacobians J_v,b of the centre of mass and J_w,b of the rotation:
+Every sum runs over the moving links b with Jacobians J_v,b of the center of mass and J_w,b of the rotation:
 
     M   = sum_b  m_b J_v^T J_v + J_w^T I_b J_w
     tau = sum_b  J_v^T m_b (a_b + g z) + J_w^T (I_b alpha_b + w_b x I_b w_b)
@@ -93,7 +93,7 @@ class RigidBodyTree:
         return Frames(rot, origin, com, axis)
 
     def center_of_mass(self, q: Array, rot_base_to_world: Array | None = None) -> Array:
-        """Whole-body centre of mass relative to the base origin, (..., 3) (m)."""
+        """Whole-body center of mass relative to the base origin, (..., 3) (m)."""
         com = self.frames(q, rot_base_to_world).com
         return np.einsum("b,...bi->...i", self._mass, com) / self.mass
 

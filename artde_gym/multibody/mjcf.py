@@ -3,7 +3,7 @@
 Unlike URDF the format holds a whole world, so that ground, contacts and solver are written here too. Contacts are
 listed pair by pair: a pair's friction is its own, and is not combined from those of its two shapes. MuJoCo softens a
 contact: it pushes back as a critically damped spring of time constant `CONTACT_TIME` whose impedance rises from .9 to
-.95 over the first millimetre of depth; an elliptic cone with `impratio` 10 lets friction slip ten times less than the
+.95 over the first millimeter of depth; an elliptic cone with `impratio` 10 lets friction slip ten times less than the
 normal direction yields.
 """
 
@@ -93,7 +93,7 @@ def _body(parent: ET.Element, link: Link, armature: float) -> ET.Element:
         ET.SubElement(body, "joint", name=link.name, axis=numbers(link.axis), armature=numbers([armature]))
     ET.SubElement(body, "inertial", pos=numbers(link.com), mass=numbers([link.mass]), diaginertia=numbers(link.inertia))
     for box in link.visuals:
-        body.append(_shape(box, rgba=numbers(box.colour)))
+        body.append(_shape(box, rgba=numbers(box.color)))
     for index, box in enumerate(link.collisions):
         body.append(_shape(box, name=_collision(link, index), group="3"))  # the renderer shows groups 0 to 2
     return body

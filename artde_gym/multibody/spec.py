@@ -27,7 +27,7 @@ class Box:
 
     size: Vector
     center: Vector
-    colour: Colour = (0.62, 0.65, 0.70, 1.0)
+    color: Colour = (0.62, 0.65, 0.70, 1.0)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,8 +36,8 @@ class Link:
 
     Attributes:
         mass: kg, above zero.
-        com: centre of mass in the link frame (m).
-        inertia: principal moments about the centre of mass, along the link's axes (kg m^2); they
+        com: center of mass in the link frame (m).
+        inertia: principal moments about the center of mass, along the link's axes (kg m^2); they
             must satisfy the triangle inequality, since engines drop the whole tensor otherwise.
         parent: name of the parent link; None for the base.
         origin: of the joint, in the parent link's frame (m). At the zero position all link frames
@@ -134,8 +134,8 @@ class RobotSpec:
         for link in self.links:
             origins[link.name] = np.asarray(link.origin) + (0.0 if link.parent is None else origins[link.parent])
             for box in link.visuals:
-                centre = float(origins[link.name][2]) + box.center[2]
-                low, high = min(low, centre - box.size[2] / 2), max(high, centre + box.size[2] / 2)
+                center = float(origins[link.name][2]) + box.center[2]
+                low, high = min(low, center - box.size[2] / 2), max(high, center + box.size[2] / 2)
         return high - low
 
     def merged(self) -> RobotSpec:

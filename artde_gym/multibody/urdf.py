@@ -40,7 +40,7 @@ def _shape(tag: str, box: Box, name: str) -> ET.Element:
     ET.SubElement(geometry, "box", size=numbers(box.size))
     if tag == "visual":
         material = ET.SubElement(element, "material", name=name)
-        ET.SubElement(material, "color", rgba=numbers(box.colour))
+        ET.SubElement(material, "color", rgba=numbers(box.color))
     return element
 
 

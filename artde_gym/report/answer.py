@@ -8,7 +8,7 @@ from artde_gym.evaluation import statistics
 from artde_gym.evaluation.console import UNITS
 from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.statistics import Estimate
-from artde_gym.tracking import Tracking
+from artde_gym.metrics_spec import MetricsSpec
 
 FEW = 6  # seeds, below which an interval is itself uncertain
 
@@ -24,7 +24,7 @@ def ranking(result: Result, scenario: str, metric: str) -> list[str]:
     return sorted((name for name in result.controllers if len(result.rows(scenario, name))), key=order)
 
 
-def headline(result: Result, trackings: dict[str, Tracking]) -> str:
+def headline(result: Result, trackings: dict[str, MetricsSpec]) -> str:
     """One sentence over all scenarios."""
     if len(result.controllers) == 1:
         return f"{result.controllers[0]} was evaluated alone: there is nothing to compare it with."
@@ -36,7 +36,7 @@ def headline(result: Result, trackings: dict[str, Tracking]) -> str:
     return f"Best, by falls first and RMS error second: {'; '.join(parts)}."
 
 
-def sentences(result: Result, scenario: str, tracking: Tracking) -> list[str]:
+def sentences(result: Result, scenario: str, tracking: MetricsSpec) -> list[str]:
     """What a scenario shows: the leader's falls and error, then how the others compare with it, the closest first."""
     metric = metric_of(tracking)
     best, *rivals = names = ranking(result, scenario, metric)
@@ -79,7 +79,7 @@ def _all_fall(result: Result, scenario: str) -> bool:
     return bool(result.episodes.loc[result.episodes["scenario"] == scenario, "fell"].all())
 
 
-def metric_of(tracking: Tracking) -> str:
+def metric_of(tracking: MetricsSpec) -> str:
     """Name of the RMS error that controllers are ranked by."""
     return f"rmse_{tracking.errors[0].unit}"
 

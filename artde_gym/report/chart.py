@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from artde_gym.arrays import Array
-from artde_gym.palette import Look
+from artde_gym.palette import Style
 
 _ASSETS = Path(__file__).parent / "assets"
 COLUMNS = 220
@@ -111,13 +111,13 @@ class Chart:
         self.width, self.height = width, height
         self._parts = [self._frame(names)] if frame else []
 
-    def line(self, x: ArrayLike, y: ArrayLike, look: Look, *, text: str = "", kind: str = "line") -> None:
+    def line(self, x: ArrayLike, y: ArrayLike, look: Style, *, text: str = "", kind: str = "line") -> None:
         """Connect points, thinned; gaps where a value is not finite."""
         across, up = self._points(x, y)
         if len(across) > 2 * COLUMNS and kind != "path":
             across, up = _thinned(across, up)
         self._parts.append(
-            f'<path class="{kind}" style="--c:{look.colour}" d="{_path(across, up)}">{_title(text)}</path>'
+            f'<path class="{kind}" style="--c:{look.color}" d="{_path(across, up)}">{_title(text)}</path>'
         )
 
     def reference(self, x: ArrayLike, y: ArrayLike, text: str = "reference") -> None:
@@ -125,21 +125,21 @@ class Chart:
         across, up = self._points(x, y)
         self._parts.append(f'<path class="reference" d="{_path(*_thinned(across, up))}">{_title(text)}</path>')
 
-    def marker(self, x: float, y: float, look: Look, text: str = "") -> None:
+    def marker(self, x: float, y: float, look: Style, text: str = "") -> None:
         (across,), (up,) = self._points([x], [y])
         if math.isfinite(across + up):
             shape = SHAPES.get(look.marker, SHAPES["o"])
             place = f"translate({across:.1f} {up:.1f})"
             self._parts.append(
-                f'<path class="marker" style="--c:{look.colour}" transform="{place}" d="{shape}">{_title(text)}</path>'
+                f'<path class="marker" style="--c:{look.color}" transform="{place}" d="{shape}">{_title(text)}</path>'
             )
 
-    def interval(self, x: float, low: float, high: float, look: Look) -> None:
+    def interval(self, x: float, low: float, high: float, look: Style) -> None:
         """A vertical bar, from low to high."""
         (across, _), ups = self._points([x, x], [low, high])
         if np.isfinite(ups).all():
             self._parts.append(
-                f'<path class="interval" style="--c:{look.colour}" d="M{across:.1f} {ups[0]:.1f}V{ups[1]:.1f}"/>'
+                f'<path class="interval" style="--c:{look.color}" d="M{across:.1f} {ups[0]:.1f}V{ups[1]:.1f}"/>'
             )
 
     def dash(self, x: float, y: float, text: str) -> None:
@@ -148,13 +148,13 @@ class Chart:
         if math.isfinite(up):
             self._parts.append(f'<path class="dash" d="M{across - 7:.1f} {up:.1f}h14">{_title(text)}</path>')
 
-    def cross(self, x: float, y: float, look: Look, text: str) -> None:
+    def cross(self, x: float, y: float, look: Style, text: str) -> None:
         """A cross: here it fell."""
         (across,), (up,) = self._points([x], [y])
         if math.isfinite(across + up):
             place = f"translate({across:.1f} {up:.1f})"
             self._parts.append(
-                f'<path class="cross" style="--c:{look.colour}" transform="{place}" d="M-5 -5L5 5M-5 5L5 -5">'
+                f'<path class="cross" style="--c:{look.color}" transform="{place}" d="M-5 -5L5 5M-5 5L5 -5">'
                 f"{_title(text)}</path>"
             )
 
@@ -171,11 +171,11 @@ class Chart:
             f'<text {place} y="{TOP + 10}">{escape(text)}</text></g>'
         )
 
-    def level(self, y: float, text: str, look: Look | None = None) -> None:
+    def level(self, y: float, text: str, look: Style | None = None) -> None:
         """A horizontal line with its meaning at the right end."""
         (_,), (up,) = self._points([self.x.low], [y])
         if TOP <= up <= self.height - BOTTOM:
-            style = f' style="--c:{look.colour}"' if look else ""
+            style = f' style="--c:{look.color}"' if look else ""
             self._parts.append(
                 f'<g class="level"{style}><path d="M{LEFT} {up:.1f}H{self.width - RIGHT}"/>'
                 f'<text x="{self.width - RIGHT - 2}" y="{up - 4:.1f}" text-anchor="end">{escape(text)}</text></g>'

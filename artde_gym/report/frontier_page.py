@@ -11,7 +11,7 @@ import pandas as pd
 
 from artde_gym.errors import StoreError
 from artde_gym.evaluation.store import parse_table
-from artde_gym.palette import looks
+from artde_gym.palette import styles
 from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.html import Cell, figure, table
 from artde_gym.studies.frontier.axis import Axis as Varied
@@ -56,7 +56,7 @@ def answer(found: Frontier) -> tuple[str, list[str]]:
 def parts(found: Frontier) -> list[str]:
     """Chart and tables."""
     axis = found.axis
-    shown = looks(str(row["controller"]) for row in _records(found.table))
+    shown = styles(str(row["controller"]) for row in _records(found.table))
     x = Axis.of(f"{axis.path} ({axis.unit})" if axis.unit != "1" else axis.path, [axis.low, axis.high])
     chart = Chart("Share of episodes without a fall against what was varied", x, Axis("no fall (%)", 0, 104), 460, 280)
     chart.level(100 * found.survival, f"wanted: {100 * found.survival:g} %")

@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import NamedTuple
 
-from artde_gym.palette import Look
+from artde_gym.palette import Style
 from artde_gym.report.chart import SHAPES
 
 ASSETS = Path(__file__).parent / "assets"
@@ -76,9 +76,9 @@ def table(caption: str, columns: Sequence[str], rows: Iterable[Sequence[str | Ce
 
 
 def figure(
-    caption: str, charts: Mapping[str, str], legend: Mapping[str, Look] | None = None, *, kind: str = "charts"
+    caption: str, charts: Mapping[str, str], legend: Mapping[str, Style] | None = None, *, kind: str = "charts"
 ) -> str:
-    """Charts by their heads, side by side where there is room, under one legend; or "shots", or a "film"."""
+    """Charts by their heads, side by side where there is room, under one legend; or "snapshots", or a "video"."""
     drawn = "".join(
         f'<div class="chart">{f"<h4>{escape(head)}</h4>" if head else ""}{svg}</div>' for head, svg in charts.items()
     )
@@ -89,8 +89,8 @@ def figure(
     )
 
 
-def _key(name: str, look: Look) -> str:
-    style, shape = f'style="--c:{look.colour}"', SHAPES.get(look.marker, SHAPES["o"])
+def _key(name: str, look: Style) -> str:
+    style, shape = f'style="--c:{look.color}"', SHAPES.get(look.marker, SHAPES["o"])
     drawn = f'<path class="line" {style} d="M-14 0H14"/><path class="marker" {style} d="{shape}"/>'
     return f'<span class="key"><svg aria-hidden="true" viewBox="-14 -7 28 14">{drawn}</svg>{escape(name)}</span>'
 

@@ -27,7 +27,7 @@ from artde_gym.registration import registered_controllers
 from artde_gym.report.answer import metric_of, ranking
 from artde_gym.report.html import figure, paragraph
 from artde_gym.report.run import Run, nested
-from artde_gym.video.frames import Shot, shots
+from artde_gym.video.frames import Frame, render_frames
 from artde_gym.video.recording import video
 
 WIDTH = 320  # pixels, of a picture
@@ -42,7 +42,7 @@ LENGTH, LEAD = 10.0, 6.0  # s, of a video, and how much of it is before what is 
 Progress = Callable[[str], None]
 
 
-class Sight(NamedTuple):
+class Snapshot(NamedTuple):
     """One picture of a strip: when (s), and what it shows in words."""
 
     strip: str
@@ -51,7 +51,7 @@ class Sight(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True)
-class Album:
+class SnapshotSet:
     """Pictures, and perhaps videos, of a run.
 
     Attributes:
@@ -80,20 +80,22 @@ class Album:
         figures, missed = [], []
         for place, name in enumerate(self._drawable(scenario)):
             row = self._row(scenario, name, number)
-            sights = _falling(name, row)
+            snapshots = _falling(name, row)
             if place == 0:  # the best one
-                sights = [*self._moving(scenario, name, row), *_events(name, row), *sights]
-            if not sights:
+                snapshots = [*self._moving(scenario, name, row), *_events(name, row), *snapshots]
+            if not snapshots:
                 continue
             self.on_progress(f"pictures of {name} in {scenario}")
-            seen = self._seen(scenario, name, row, sights)
+            seen = self._seen(scenario, name, row, snapshots)
             if not _repeats(row, seen):
                 missed.append(name)
                 continue
             strips: dict[str, dict[str, str]] = {}
-            for sight in sights:
-                strips.setdefault(sight.strip, {})[sight.text] = _image(seen[sight.time_s], sight)
-            figures += [figure(f"{strip}, episode {number}.", images, kind="shots") for strip, images in strips.items()]
+            for snapshot in snapshots:
+                strips.setdefault(snapshot.strip, {})[snapshot.text] = _image(seen[snapshot.time_s], snapshot)
+            figures += [
+                figure(f"{strip}, episode {number}.", images, kind="snapshots") for strip, images in strips.items()
+            ]
         if missed:
             said = (
                 "did not repeat the stored episode (another machine, or other versions?), so there is no picture of it"
@@ -129,7 +131,7 @@ class Album:
         label = escape(f"{scenario}: {', '.join(names)} on the same seed", quote=True)
         moving = f'<video controls muted playsinline aria-label="{label}" src="data:video/mp4;base64,{data}"></video>'
         caption = f"{', '.join(names)} on the same seed, episode {number}, from {start:.0f} s on."
-        return [figure(caption, {"": moving}, kind="film")]
+        return [figure(caption, {"": moving}, kind="video")]
 
     def _moment(self, scenario: str, rows: list[Row]) -> float:
         """What a video should not miss: the first fall, else the first later event, else the motion."""
@@ -140,19 +142,23 @@ class Album:
         later = [begin for begin, _ in _spans(rows[0]).values() if begin > settled]
         return min([*later, settled + LEAD])
 
-    def _moving(self, scenario: str, name: str, row: Row) -> list[Sight]:
+    def _moving(self, scenario: str, name: str, row: Row) -> list[Snapshot]:
         """One period of the motion."""
         motion, settled, period = ROBOTS[robot_of(self.run.cell(scenario)["env_id"])].motion
         start, span = min(settled, 0.3 * row["duration_s"]), min(period, 0.6 * row["duration_s"])
         times = [start + span * i / MOTION for i in range(MOTION)]
-        return [Sight(f"The {motion} under {name}", time, f"{time:.2f} s") for time in times]
+        return [Snapshot(f"The {motion} under {name}", time, f"{time:.2f} s") for time in times]
 
-    def _seen(self, scenario: str, name: str, row: Row, sights: Iterable[Sight]) -> dict[float, Shot]:
+    def _seen(self, scenario: str, name: str, row: Row, snapshots: Iterable[Snapshot]) -> dict[float, Frame]:
         """Shots by the time that they were wanted at; none after the end of an episode that ended earlier."""
-        cell, times = self.run.cell(scenario), sorted({sight.time_s for sight in sights})
+        cell, times = self.run.cell(scenario), sorted({snapshot.time_s for snapshot in snapshots})
         spec, gains = registered_controllers()[name], self.run.gains(scenario).get(name, {})
         return dict(
-            zip(times, shots(cell["env_id"], cell["kwargs"], spec, gains, int(row["seed"]), times, WIDTH), strict=False)
+            zip(
+                times,
+                render_frames(cell["env_id"], cell["kwargs"], spec, gains, int(row["seed"]), times, WIDTH),
+                strict=False,
+            )
         )
 
     def _number(self, scenario: str) -> int:
@@ -174,23 +180,23 @@ class Album:
 Row = Mapping[str, Any]
 
 
-def _falling(name: str, row: Row) -> list[Sight]:
+def _falling(name: str, row: Row) -> list[Snapshot]:
     if not row["fell"]:
         return []
     fall, strip = float(row["time_to_fall_s"]), f"The fall of {name}"
     times = [(before, fall - before) for before in BEFORE_FALL if before < fall]
-    return [Sight(strip, time, f"{before:g} s before" if before else f"at {fall:.2f} s") for before, time in times]
+    return [Snapshot(strip, time, f"{before:g} s before" if before else f"at {fall:.2f} s") for before, time in times]
 
 
-def _events(name: str, row: Row) -> list[Sight]:
+def _events(name: str, row: Row) -> list[Snapshot]:
     """Before, during and after each push and drop that the episode reached."""
-    sights = []
+    snapshots = []
     for event, (begin, end) in _spans(row).items():
         strip = f"{event} at {begin:g} s{_force(row, event)} under {name}"
         times = {"before": begin - BEFORE_EVENT, "in the middle": (begin + end) / 2}
         times |= {f"{after:g} s after": end + after for after in AFTER_EVENT}
-        sights += [Sight(strip, time, text) for text, time in times.items() if 0 <= time <= row["duration_s"]]
-    return sights
+        snapshots += [Snapshot(strip, time, text) for text, time in times.items() if 0 <= time <= row["duration_s"]]
+    return snapshots
 
 
 def _force(row: Row, event: str) -> str:
@@ -204,17 +210,17 @@ def _spans(row: Row) -> Mapping[str, Span]:
     return {event: span for event, span in events_of(drawn).items() if span[0] < row["duration_s"]}
 
 
-def _repeats(row: Row, seen: Mapping[float, Shot]) -> bool:
+def _repeats(row: Row, seen: Mapping[float, Frame]) -> bool:
     """Whether a run went as the stored one: the same fall at the same time, or none."""
-    falls = [shot.time_s for shot in seen.values() if shot.over and shot.fall_reason]
+    falls = [frame.time_s for frame in seen.values() if frame.over and frame.fall_reason]
     expected = [float(row["time_to_fall_s"])] if row["fell"] else []
     return len(falls) == len(expected) and all(map(math.isclose, falls, expected))
 
 
-def _image(shot: Shot, sight: Sight) -> str:
+def _image(frame: Frame, snapshot: Snapshot) -> str:
     buffer = io.BytesIO()
-    Image.fromarray(shot.picture).save(buffer, "WEBP", quality=QUALITY, method=6)
-    text = escape(f"{sight.strip}: {sight.text}", quote=True)
-    height, width, _ = shot.picture.shape
+    Image.fromarray(frame.picture).save(buffer, "WEBP", quality=QUALITY, method=6)
+    text = escape(f"{snapshot.strip}: {snapshot.text}", quote=True)
+    height, width, _ = frame.picture.shape
     data = base64.b64encode(buffer.getvalue()).decode()
     return f'<img alt="{text}" width="{width}" height="{height}" src="data:image/webp;base64,{data}">'

@@ -9,7 +9,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from artde_gym.arguments import reading
+from artde_gym.arguments import wrap_read_errors
 from artde_gym.errors import StoreError
 from artde_gym.evaluation.environments import physics_of, robot_of
 from artde_gym.evaluation.provenance import MIXED
@@ -18,7 +18,7 @@ from artde_gym.report import frontier_page, signals, tables, training_page
 from artde_gym.report.answer import headline, sentences
 from artde_gym.report.html import bullets, page, paragraph, section
 from artde_gym.report.laws import Laws, unavailable
-from artde_gym.report.pictures import Album, Progress
+from artde_gym.report.pictures import Progress, SnapshotSet
 from artde_gym.report.robot import figures_of
 from artde_gym.report.run import Episode, Run
 from artde_gym.scenarios import SCENARIOS
@@ -49,19 +49,19 @@ def write_report(
     if not folder.is_dir():
         raise StoreError("results folder", str(folder), "a folder that `evaluate`, `frontier` or `train` wrote")
     wanted = "one that `evaluate`, `frontier` or `train` of this release wrote"
-    with reading("results folder", folder, wanted, StoreError):
+    with wrap_read_errors("results folder", folder, wanted, StoreError):
         if (folder / RECORD).exists():
             text = _frontier(folder)
         elif (folder / training_page.RECORD).exists():
             text = _training(training_page.read_training(folder))
         else:
             run = Run.read(folder)
-            text = _evaluation(run, Album(run, pictures, videos, on_progress))
+            text = _evaluation(run, SnapshotSet(run, pictures, videos, on_progress))
     write_atomically(folder / NAME, lambda file: file.write(text.encode()))
     return folder / NAME
 
 
-def _evaluation(run: Run, album: Album) -> str:
+def _evaluation(run: Run, album: SnapshotSet) -> str:
     result = run.result
     if not len(result.episodes):
         return page("artde-gym report", ["<h1>No episode was finished yet</h1>", _origin(run.record)])
@@ -93,7 +93,7 @@ def _plants(run: Run) -> list[str]:
     return [part for several in parts.values() for part in several]
 
 
-def _scenario(run: Run, laws: Laws, album: Album, scenario: str, said: list[str]) -> str:
+def _scenario(run: Run, laws: Laws, album: SnapshotSet, scenario: str, said: list[str]) -> str:
     entry, cell = SCENARIOS.get(scenario), run.cell(scenario)
     place = f"{cell['env_id']} in {physics_of(cell['kwargs'])}"
     parts = [paragraph(f"{place}: {entry.text}." if entry else f"{place}.", "soft")]

@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from artde_gym.arguments import reading
+from artde_gym.arguments import wrap_read_errors
 from artde_gym.arrays import Array
 from artde_gym.errors import StoreError
-from artde_gym.evaluation.environments import tracking_of
+from artde_gym.evaluation.environments import metrics_spec_of
 from artde_gym.evaluation.metrics import Span, events_of
 from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.store import parse_table, read_episodes
+from artde_gym.metrics_spec import MetricsSpec
 from artde_gym.studies.reproduce.claims import CLAIM_COLUMNS
-from artde_gym.tracking import Tracking
 
 ABLATIONS = "ablation"  # folder of `reproduce`'s ablations
 TIME = "time"
@@ -51,7 +51,7 @@ class Run:
         Raises:
             StoreError: if it is none.
         """
-        with reading("results folder", folder, "one that `evaluate` or `frontier` wrote", StoreError):
+        with wrap_read_errors("results folder", folder, "one that `evaluate` or `frontier` wrote", StoreError):
             record = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
             wanted = record["configuration"]
             count = len(wanted["cells"]) * len(wanted["controllers"]) * wanted["episodes"]
@@ -59,7 +59,7 @@ class Run:
         complete = len(episodes) >= count
         judged, claims = None, folder / "claims.csv"
         if claims.exists():
-            with reading("claims.csv", claims, "a table that `reproduce` wrote", StoreError):
+            with wrap_read_errors("claims.csv", claims, "a table that `reproduce` wrote", StoreError):
                 judged = parse_table(claims.read_text(encoding="utf-8"), CLAIM_COLUMNS)
         found = {file.parent.name: cls.read(file.parent) for file in folder.glob(f"{ABLATIONS}/*/summary.json")}
         ablation = {cell["name"]: found[cell["name"]] for cell in wanted["cells"] if cell["name"] in found}
@@ -82,8 +82,8 @@ class Run:
         """Names of registered metrics that its episodes have."""
         return [name for name in self.record["configuration"].get("metrics", ()) if name in self.result.metrics]
 
-    def tracking(self, scenario: str) -> Tracking:
-        return tracking_of(self.cell(scenario)["env_id"])
+    def tracking(self, scenario: str) -> MetricsSpec:
+        return metrics_spec_of(self.cell(scenario)["env_id"])
 
     def episode(self, scenario: str) -> Episode | None:
         """The first episode whose signals are stored, of all controllers that have it."""
@@ -106,7 +106,7 @@ class Run:
         rows = self.result.rows(scenario, controller)
         if not path.exists() or number not in rows.index:
             return None
-        with reading("signals", path, "a file that `evaluate` wrote", StoreError):
+        with wrap_read_errors("signals", path, "a file that `evaluate` wrote", StoreError):
             stored = np.load(io.BytesIO(path.read_bytes()), allow_pickle=False)  # a damaged file it would leave open
             return Signals({name: stored[name] for name in stored.files}, rows.loc[number].to_dict())
 

@@ -6,11 +6,11 @@ import numpy as np
 
 from artde_gym.arrays import Array
 from artde_gym.evaluation.console import UNITS
-from artde_gym.palette import looks
+from artde_gym.metrics_spec import MetricsSpec, TrackedSignal
+from artde_gym.palette import styles
 from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.html import figure
 from artde_gym.report.run import INSIDE, Episode, Signals
-from artde_gym.tracking import Tracked, Tracking
 
 INNER: dict[str, tuple[str, str]] = {
     "beta_0": ("b0", "b0 (acceleration)"),
@@ -26,9 +26,9 @@ RATES = (("qd_ref", "qd"), ("velocity_ref", "velocity"))
 SETTLED = 0.5  # of a run, after which its largest V is taken as the bound
 
 
-def tracking_error(episode: Episode, tracking: Tracking) -> list[str]:
+def tracking_error(episode: Episode, tracking: MetricsSpec) -> list[str]:
     """One figure for each tracked vector, one chart for each of its axes."""
-    shown = looks(episode.signals)
+    shown = styles(episode.signals)
     figures = []
     for tracked in tracking.errors:
         errors = {name: _error(signals, tracked) for name, signals in episode.signals.items()}
@@ -70,13 +70,13 @@ def gains(episode: Episode) -> str:
     if not charts:
         return ""
     caption = f"Inside the laws, episode {episode.number}: adaptive gains, estimation error and sliding variable."
-    return figure(caption, charts, looks(episode.signals))
+    return figure(caption, charts, styles(episode.signals))
 
 
-def lyapunov(episode: Episode, tracking: Tracking, matrix: tuple[str, Array, Array, Array]) -> str:
+def lyapunov(episode: Episode, tracking: MetricsSpec, matrix: tuple[str, Array, Array, Array]) -> str:
     """V = 1/2 xi^T P xi along the run, and the largest value of its second half."""
     owner, p11, p12, p22 = matrix
-    shown = looks(episode.signals)
+    shown = styles(episode.signals)
     values = {}
     for name, signals in episode.signals.items():
         e, rate = tracking.errors[0].error(signals.fields), _rate(signals)
@@ -126,14 +126,14 @@ def over_time(
 
 def add(chart: Chart, signals: Signals, values: Array, name: str) -> None:
     """One controller's signal, with a cross where it fell."""
-    look = looks([name])[name]
+    look = styles([name])[name]
     time = signals.time[: len(values)]
     chart.line(time, values, look, text=name)
     if signals.fell and len(values):
         chart.cross(float(time[-1]), float(values[-1]), look, f"{name} fell at {float(signals.time[-1]):.1f} s")
 
 
-def _error(signals: Signals, tracked: Tracked) -> Array:
+def _error(signals: Signals, tracked: TrackedSignal) -> Array:
     if tracked.diagnostic is not None and INSIDE + tracked.diagnostic in signals.fields:
         return tracked.scale * signals.fields[INSIDE + tracked.diagnostic]
     return tracked.scale * tracked.error(signals.fields)

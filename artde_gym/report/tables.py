@@ -10,7 +10,7 @@ import pandas as pd
 from artde_gym.evaluation import statistics, thesis
 from artde_gym.evaluation.console import ALL, REFERENCE, UNITS, digits_of, measured, share_text, time_text
 from artde_gym.evaluation.statistics import Estimate
-from artde_gym.palette import looks
+from artde_gym.palette import styles
 from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.html import Cell, details, figure, table
 from artde_gym.report.run import Run
@@ -52,7 +52,7 @@ def falls(run: Run, scenario: str) -> str:
 def survival(run: Run, scenario: str) -> str:
     """The share of episodes that has not fallen yet, over time."""
     result = run.result
-    shown = looks(result.controllers)
+    shown = styles(result.controllers)
     end = float(result.episodes.loc[result.episodes["scenario"] == scenario, "duration_s"].max())
     chart = Chart(
         f"{scenario}: share of episodes without a fall, over time",
@@ -176,7 +176,7 @@ def _printed_change(reference: str | None, metric: str, axis: str, rival: str) -
 def _dots(run: Run, scenario: str, metric: str, title: str, axes: list[str]) -> str:
     """Means with their intervals side by side, and the thesis' values as short marks."""
     result, reference = run.result, _reference(scenario)
-    shown, count = looks(result.controllers), len(result.controllers)
+    shown, count = styles(result.controllers), len(result.controllers)
     points: list[tuple[float, str, Estimate, float | None]] = []
     for place, axis in enumerate(axes):
         column = metric if axis == ALL else f"{metric}_{axis}"

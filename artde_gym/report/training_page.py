@@ -11,7 +11,7 @@ import pandas as pd
 
 from artde_gym.errors import StoreError
 from artde_gym.evaluation.store import parse_table
-from artde_gym.palette import looks
+from artde_gym.palette import styles
 from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.html import Cell, figure, paragraph, table
 
@@ -91,7 +91,7 @@ def answer(run: Trained) -> tuple[str, list[str]]:
 
 def parts(run: Trained) -> list[str]:
     """Charts of every number that the tests have, and all of them as a table."""
-    tests, shown = run.tests, looks([run.name])
+    tests, shown = run.tests, styles([run.name])
     look = shown[run.name]
     steps = tests["steps"].to_numpy(dtype=float) / MILLION
     across = Axis("decisions (millions)", 0.0, float(steps.max()) * 1.02)
@@ -112,7 +112,9 @@ def parts(run: Trained) -> list[str]:
         for row in tests.itertuples(index=False, name=None)
     ]
     wanted = run.record["configuration"]
-    said = f"{run.name} in {wanted['env_id']}: {wanted['recipe']['channel']} channel, seed {wanted['seed']}, at most "
+    said = (
+        f"{run.name} in {wanted['env_id']}: {wanted['recipe']['action_mode']} channel, seed {wanted['seed']}, at most "
+    )
     return [
         paragraph(f"{said}{_millions(wanted['steps'])} decisions."),
         figure("Held-out tests during the training; the vertical mark is the policy that was kept.", charts, shown),

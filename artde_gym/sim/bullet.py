@@ -1,7 +1,7 @@
 """The engine protocol on PyBullet.
 
 Bullet's habits that stay in here: it knows no armature, so that rotors become links with gears; the base is read and
-set by its centre-of-mass frame; torque control holds for one step; motors are on until told otherwise; joint speeds are
+set by its center-of-mass frame; torque control holds for one step; motors are on until told otherwise; joint speeds are
 clamped at 100 rad/s by default; friction of a pair is the product of both bodies'; the solver stops early at a residual
 that leaves 1 % errors in geared joints; every call needs the client's number, or a second simulation in the process
 corrupts the first.
@@ -26,10 +26,10 @@ from artde_gym.errors import RobotError
 from artde_gym.multibody.spec import RobotSpec, Vector
 from artde_gym.multibody.urdf import urdf
 from artde_gym.sim.camera import FIELD_OF_VIEW, NEAR, Camera
-from artde_gym.sim.engine import PAYLOAD_COLOUR, PAYLOAD_LOOK, PAYLOAD_RADIUS, State
+from artde_gym.sim.engine import PAYLOAD_COLOR, PAYLOAD_LOOK, PAYLOAD_RADIUS, State
 from artde_gym.sim.ground import SUN, Shadow, paint
-from artde_gym.sim.quiet import bullet
-from artde_gym.sim.rotation import Quaternion, moved, rotated
+from artde_gym.sim.pybullet_module import bullet
+from artde_gym.sim.rotation import Quaternion, point_velocity, rotate
 
 GEAR_ITERATIONS = 60  # of the solver; with 30, what is left over in the gears raises ARTDE's RMSE in S1 by a third
 BARE_ITERATIONS = 50  # without gears
@@ -79,12 +79,12 @@ class BulletEngine:
             bullet.GEOM_MESH,
             fileName=str(Path(pybullet_data.getDataPath()) / "sphere_smooth.obj"),  # of radius 1
             meshScale=[PAYLOAD_LOOK] * 3,
-            rgbaColor=PAYLOAD_COLOUR,
+            rgbaColor=PAYLOAD_COLOR,
             physicsClientId=self._client,
         )
         self._sites = {name: (link, offset) for name, link, offset in spec.sites}
         self._com = x, y, z = spec.base.com
-        self._to_origin = (-x, -y, -z)  # of the base, from its centre of mass
+        self._to_origin = (-x, -y, -z)  # of the base, from its center of mass
         self._shadow = Shadow(spec)
         self._scales: tuple[float, dict[str, float], float] = (1.0, {}, 1.0)
         self._contact_time: float | None = None
@@ -147,7 +147,7 @@ class BulletEngine:
             bullet.changeConstraint(constraint, gearRatio=-gear.ratio, maxForce=GEAR_FORCE, erp=0.0, **client)
         return robot
 
-    def place(self, position: Vector, q: Array) -> None:
+    def reset(self, position: Vector, q: Array) -> None:
         self._remove_payload()
         center = np.add(position, self._com).tolist()
         client: dict[str, Any] = {"physicsClientId": self._client}
@@ -159,12 +159,12 @@ class BulletEngine:
             if joint >= 0:
                 bullet.resetJointState(self._robot, joint, angle.get(name, 0.0), 0.0, **client)
 
-    def snapshot(self) -> int:
+    def save_state(self) -> int:
         handle = bullet.saveState(physicsClientId=self._client)
         self._snapshots.append(_Snapshot(handle, self._friction, self._world()))
         return len(self._snapshots) - 1
 
-    def restore(self, snapshot: int) -> None:
+    def restore_state(self, snapshot: int) -> None:
         self._remove_payload()  # Bullet restores only a world with the same bodies
         saved = self._snapshots[snapshot]
         self._set_foot_friction(saved.friction)
@@ -185,7 +185,7 @@ class BulletEngine:
         self.__init__(*state["built"])
         for friction, world in state["snapshots"]:
             self._load(friction, world)
-            self.snapshot()
+            self.save_state()
         gravity, scales, contact_time, friction = state["set"]
         self.set_gravity(gravity)
         self.scale_masses(*scales)
@@ -213,7 +213,7 @@ class BulletEngine:
             file.write_bytes(world)
             bullet.restoreState(fileName=str(file), physicsClientId=self._client)
 
-    def read(self) -> State:
+    def state(self) -> State:
         client = self._client
         center, quat = bullet.getBasePositionAndOrientation(self._robot, physicsClientId=client)
         velocity, spin = bullet.getBaseVelocity(self._robot, physicsClientId=client)
@@ -222,9 +222,9 @@ class BulletEngine:
         states = bullet.getJointStates(self._robot, self._joints, physicsClientId=client) if self._joints else ()
         n = len(states)
         joints = np.array([state[0] for state in states] + [state[1] for state in states])  # one array is faster
-        x, y, z = arm = rotated(self._to_origin, quat)
+        x, y, z = arm = rotate(self._to_origin, quat)
         position = (center[0] + x, center[1] + y, center[2] + z)
-        return State(joints[:n], joints[n:], position, quat, moved(velocity, spin, arm), spin)
+        return State(joints[:n], joints[n:], position, quat, point_velocity(velocity, spin, arm), spin)
 
     def step(self, tau: Array) -> None:
         if self._joints:
@@ -233,20 +233,20 @@ class BulletEngine:
             )
         bullet.stepSimulation(physicsClientId=self._client)
 
-    def push_base(self, force: Vector, torque: Vector) -> None:
-        client = self._client  # the origin of Bullet's base frame is the base's centre of mass
+    def apply_base_wrench(self, force: Vector, torque: Vector) -> None:
+        client = self._client  # the origin of Bullet's base frame is the base's center of mass
         bullet.applyExternalForce(self._robot, -1, force, _ORIGIN, bullet.LINK_FRAME, physicsClientId=client)
         bullet.applyExternalTorque(self._robot, -1, torque, bullet.LINK_FRAME, physicsClientId=client)
 
-    def push(self, site: str, force: Vector) -> None:
+    def apply_force(self, site: str, force: Vector) -> None:
         point = self.site(site)
         link = self._links[self._site(site)[0]]
         bullet.applyExternalForce(self._robot, link, force, point, bullet.WORLD_FRAME, physicsClientId=self._client)
 
-    def load_base(self, force: Vector, torque: Vector) -> None:
+    def apply_world_wrench(self, force: Vector, torque: Vector) -> None:
         quat = bullet.getBasePositionAndOrientation(self._robot, physicsClientId=self._client)[1]
         back = (-quat[0], -quat[1], -quat[2], quat[3])
-        self.push_base(rotated(force, back), rotated(torque, back))
+        self.apply_base_wrench(rotate(force, back), rotate(torque, back))
 
     def lift_feet(self, forces: Sequence[float]) -> None:
         client = self._client
@@ -388,7 +388,7 @@ class BulletEngine:
         size = (camera.height, camera.width)
         picture = np.asarray(rgba, dtype=np.uint8).reshape(*size, 4)[..., :3].copy()
         bare = np.isin(np.asarray(body).reshape(size), (-1, self._ground))
-        paint(picture, bare, camera, self._shadow.polygons(self.read(), payload))
+        paint(picture, bare, camera, self._shadow.polygons(self.state(), payload))
         return picture
 
     def close(self) -> None:
@@ -397,7 +397,7 @@ class BulletEngine:
     def _link_frame(self, link: str) -> tuple[Vector, Quaternion]:
         index = self._links[link]
         if index < 0:
-            state = self.read()
+            state = self.state()
             return state.position, state.quat_xyzw
         state = bullet.getLinkState(self._robot, index, computeForwardKinematics=1, physicsClientId=self._client)
         return state[4], state[5]

@@ -17,10 +17,10 @@ from artde_gym.errors import OptionError
 from artde_gym.multibody.spec import RobotSpec, Vector
 from artde_gym.multibody.urdf import urdf
 from artde_gym.sim.camera import Camera
-from artde_gym.sim.engine import PAYLOAD_COLOUR, PAYLOAD_LOOK, State
+from artde_gym.sim.engine import PAYLOAD_COLOR, PAYLOAD_LOOK, State
 from artde_gym.sim.ground import SUN
-from artde_gym.sim.quiet import bullet
-from artde_gym.sim.rotation import rotated
+from artde_gym.sim.pybullet_module import bullet
+from artde_gym.sim.rotation import rotate
 
 PATIENCE = 60.0  # s, for a first window to open
 NEAR_CLICK = 60.0  # pixels, that a click may be off what it is meant for
@@ -94,7 +94,7 @@ class BulletWindow:
         ground = self._body(bullet.GEOM_MESH, fileName=str(data / "plane100.obj"))
         checks = bullet.loadTexture(str(data / "checker_blue.png"), **self._client)
         bullet.changeVisualShape(ground, -1, textureUniqueId=checks, specularColor=[0.0] * 3, **self._client)
-        self._payload = self._body(bullet.GEOM_SPHERE, radius=PAYLOAD_LOOK, rgbaColor=PAYLOAD_COLOUR)
+        self._payload = self._body(bullet.GEOM_SPHERE, radius=PAYLOAD_LOOK, rgbaColor=PAYLOAD_COLOR)
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "robot.urdf"
             file.write_text(urdf(spec), encoding="utf-8")
@@ -109,8 +109,8 @@ class BulletWindow:
         return bullet.createMultiBody(0.0, -1, bullet.createVisualShape(kind, **shape, **self._client), **self._client)
 
     def show(self, state: State, payload: Vector | None) -> None:
-        """The robot as it is, and the centre of its payload (m), if it has one."""
-        center = np.add(state.position, rotated(self._spec.base.com, state.quat_xyzw)).tolist()
+        """The robot as it is, and the center of its payload (m), if it has one."""
+        center = np.add(state.position, rotate(self._spec.base.com, state.quat_xyzw)).tolist()
         bullet.resetBasePositionAndOrientation(self._robot, center, state.quat_xyzw, **self._client)
         if self._joints:
             angles = [[angle] for angle in state.q.tolist()]

@@ -113,7 +113,7 @@ def pull(
 
 
 def _turned(vector: Vector3[Number], half: Vector3[Number]) -> Vector3[Number]:
-    """Turn a vector about `half` by 2 atan |half|, as `artde_gym.sim.rigid_bodies.turned` does."""
+    """Turn a vector about `half` by 2 atan |half|, as `artde_gym.sim.rigid_bodies.rotate_frames` does."""
     across = cross(half, vector)
     factor = 2.0 / (1.0 + dot(half, half))
     return plus(vector, scaled(factor, plus(across, cross(half, across))))

@@ -31,13 +31,13 @@ class State(NamedTuple):
 
 PAYLOAD_RADIUS = 0.08  # m, of the homogeneous ball that is the payload
 PAYLOAD_LOOK = 0.09  # m, likewise in pictures, so that it shows on either side of Ojas' torso
-PAYLOAD_COLOUR = (0.85, 0.45, 0.1, 1.0)
+PAYLOAD_COLOR = (0.85, 0.45, 0.1, 1.0)
 
 
 class World(Protocol):
     """What happens to one robot from outside; gravity, friction and masses stay as they were set."""
 
-    def push(self, site: str, force: Vector) -> None:
+    def apply_force(self, site: str, force: Vector) -> None:
         """Add a force (N, world axes) at a named site of the spec, where it is now, for the next step only.
 
         Raises:
@@ -45,7 +45,7 @@ class World(Protocol):
         """
         ...
 
-    def load_base(self, force: Vector, torque: Vector) -> None:
+    def apply_world_wrench(self, force: Vector, torque: Vector) -> None:
         """Add a force (N) at the base link's own center of mass and a torque (Nm), world axes, for the next step only.
 
         A payload does not move their point of action.
@@ -92,7 +92,7 @@ class World(Protocol):
         ...
 
     def attach_payload(self, mass: float, position: Vector) -> None:
-        """Fix a ball of `mass` (kg) and `PAYLOAD_RADIUS` to the base link, its centre at `position` in its frame (m).
+        """Fix a ball of `mass` (kg) and `PAYLOAD_RADIUS` to the base link, its center at `position` in its frame (m).
 
         It takes over the base's motion, touches nothing, and falls freely, also through the ground, once released. A
         former payload is gone.
@@ -119,28 +119,28 @@ class Engine(World, Protocol):
     spec: RobotSpec
     time_step: float
 
-    def place(self, position: Vector, q: Array) -> None:
+    def reset(self, position: Vector, q: Array) -> None:
         """Put the upright robot with its base origin at `position` (m) and the joints at `q`, all at rest.
 
         A payload is gone. The ground is felt from the next step on.
         """
         ...
 
-    def snapshot(self) -> int:
+    def save_state(self) -> int:
         """Remember the whole state of a robot without a payload; returns a handle.
 
-        That is what `read`, `foot_loads` and `ground_forces` say, what the solver remembers, and the friction.
+        That is what `state`, `foot_loads` and `ground_forces` say, what the solver remembers, and the friction.
         """
         ...
 
-    def restore(self, snapshot: int) -> None:
+    def restore_state(self, snapshot: int) -> None:
         """Return to a snapshot, bit for bit; a payload attached since is gone.
 
         Forces must not be pending: whether a push that no step has taken up yet survives is up to the engine.
         """
         ...
 
-    def read(self) -> State:
+    def state(self) -> State:
         """The state now: after the last step, or as placed or restored. Later steps do not change what was read."""
         ...
 
@@ -148,8 +148,8 @@ class Engine(World, Protocol):
         """Advance one `time_step` under joint torques `tau` (n,) (Nm)."""
         ...
 
-    def push_base(self, force: Vector, torque: Vector) -> None:
-        """Add a force (N) at the base link's own centre of mass and a torque (Nm), for the next step only.
+    def apply_base_wrench(self, force: Vector, torque: Vector) -> None:
+        """Add a force (N) at the base link's own center of mass and a torque (Nm), for the next step only.
 
         Both along the base's axes, as they are now; a payload does not move their point of action.
         """
@@ -164,7 +164,7 @@ class Engine(World, Protocol):
         ...
 
     def payload_position(self) -> Vector | None:
-        """Where the payload's centre is now (m, world axes), held or falling; None without one."""
+        """Where the payload's center is now (m, world axes), held or falling; None without one."""
         ...
 
     def ground_forces(self) -> Array:

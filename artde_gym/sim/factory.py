@@ -123,7 +123,7 @@ def installed_engines() -> dict[EngineName, str]:
 def missing_bullet() -> str:
     """Say why PyBullet cannot be imported here and what to do about it; an empty string where it can."""
     try:
-        importlib.import_module("artde_gym.sim.quiet")
+        importlib.import_module("artde_gym.sim.pybullet_module")
     except ImportError as error:
         return why_no_bullet(error)
     return ""

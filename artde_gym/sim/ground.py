@@ -1,6 +1,6 @@
 """The ground, the sky and a robot's shadow, painted behind what an engine drew: both engines' pictures look the same.
 
-The ground is the plane z = 0 with a line every half metre; it fades into a white sky with the distance. Each pixel
+The ground is the plane z = 0 with a line every half meter; it fades into a white sky with the distance. Each pixel
 takes the mean of what it covers, so that far lines neither flicker nor make patterns.
 """
 
@@ -76,10 +76,10 @@ def paint(picture: NDArray[np.uint8], bare: NDArray[np.bool_], camera: Camera, s
     sun = _sunlight(camera, shadow)[view.top :]
     fog = view.fog
     for i in range(3):
-        colour = FLOOR[i] + (LINE[i] - FLOOR[i]) * line
-        colour *= 1.0 - (1.0 - SHADE[i]) * sun
-        colour += (SKY[i] - colour) * fog
-        picture[view.top :, :, i][free] = (colour[free] + 0.5).astype(np.uint8)
+        color = FLOOR[i] + (LINE[i] - FLOOR[i]) * line
+        color *= 1.0 - (1.0 - SHADE[i]) * sun
+        color += (SKY[i] - color) * fog
+        picture[view.top :, :, i][free] = (color[free] + 0.5).astype(np.uint8)
 
 
 class _View(NamedTuple):

@@ -23,7 +23,7 @@ from artde_gym.sim.engine import State
 from artde_gym.sim.ground import Shadow, paint
 from artde_gym.sim.mujoco_canvas import Canvas
 from artde_gym.sim.mujoco_world import STATE, Blueprint, Fields, MujocoWorld
-from artde_gym.sim.rotation import Quaternion, moved, rotated
+from artde_gym.sim.rotation import Quaternion, point_velocity, rotate
 
 mj: Any = mujoco  # compiled, without type information
 
@@ -67,17 +67,17 @@ class MujocoEngine(MujocoWorld):
         self._canvas = Canvas(model) if renders else None
         self._shadow = Shadow(spec)
 
-    def place(self, position: Vector, q: Array) -> None:
+    def reset(self, position: Vector, q: Array) -> None:
         self._remove_payload()
         mj.mj_resetData(self._model, self._data)
         self._pose[:] = (*position, 1.0, 0.0, 0.0, 0.0)
         self._q[self._joints] = q
 
-    def snapshot(self) -> int:
+    def save_state(self) -> int:
         self._snapshots.append((self._saved(), self._forces.copy(), self._model.pair_friction.copy()))
         return len(self._snapshots) - 1
 
-    def restore(self, snapshot: int) -> None:
+    def restore_state(self, snapshot: int) -> None:
         self._remove_payload()
         state, self._forces[:], self._model.pair_friction[:] = self._snapshots[snapshot]
         mj.mj_setState(self._model, self._data, state, STATE)
@@ -107,12 +107,12 @@ class MujocoEngine(MujocoWorld):
         mj.mj_getState(self._model, self._data, state, STATE)
         return state
 
-    def read(self) -> State:
+    def state(self) -> State:
         x, y, z, w, i, j, k = self._pose.tolist()
         vx, vy, vz, wx, wy, wz = self._twist.tolist()
         quat = (i, j, k, w)
         q, qd = self._q[self._joints].copy(), self._qd[self._joints].copy()
-        return State(q, qd, (x, y, z), quat, (vx, vy, vz), rotated((wx, wy, wz), quat))
+        return State(q, qd, (x, y, z), quat, (vx, vy, vz), rotate((wx, wy, wz), quat))
 
     def step(self, tau: Array) -> None:
         self._torque[self._joints] = tau
@@ -121,9 +121,9 @@ class MujocoEngine(MujocoWorld):
             self._pushes[:] = 0.0
             self._pushed = False
 
-    def push_base(self, force: Vector, torque: Vector) -> None:
+    def apply_base_wrench(self, force: Vector, torque: Vector) -> None:
         quat = self._quat()
-        self.add_force(self._blueprint.base, rotated(force, quat), rotated(torque, quat))
+        self.add_force(self._blueprint.base, rotate(force, quat), rotate(torque, quat))
 
     def add_force(self, body: int, force: Vector, torque: Vector | NDArray[Any]) -> None:
         super().add_force(body, force, torque)
@@ -145,9 +145,9 @@ class MujocoEngine(MujocoWorld):
 
     def release_payload(self) -> None:
         if self.held is not None:
-            _, _, position, quat, velocity, spin = self.read()
-            arm = rotated(self.held, quat)
-            self._fall = _Fall(np.add(position, arm), np.array(moved(velocity, spin, arm)), self._data.time)
+            _, _, position, quat, velocity, spin = self.state()
+            arm = rotate(self.held, quat)
+            self._fall = _Fall(np.add(position, arm), np.array(point_velocity(velocity, spin, arm)), self._data.time)
         super().release_payload()
 
     def masses_changed(self) -> None:
@@ -159,8 +159,8 @@ class MujocoEngine(MujocoWorld):
 
     def payload_position(self) -> Vector | None:
         if self.held is not None:
-            state = self.read()
-            (x, y, z), (ax, ay, az) = state.position, rotated(self.held, state.quat_xyzw)
+            state = self.state()
+            (x, y, z), (ax, ay, az) = state.position, rotate(self.held, state.quat_xyzw)
             return x + ax, y + ay, z + az
         if self._fall is not None:
             position, velocity, start = self._fall
@@ -175,7 +175,7 @@ class MujocoEngine(MujocoWorld):
         mj.mj_camlight(self._model, self.placed())
         ball = self.payload_position() if load is None else load
         picture, bare = self._canvas.draw(self._data, camera, ball)
-        paint(picture, bare, camera, self._shadow.polygons(self.read(), ball))
+        paint(picture, bare, camera, self._shadow.polygons(self.state(), ball))
         return picture
 
     def close(self) -> None:

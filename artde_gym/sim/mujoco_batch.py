@@ -16,7 +16,7 @@ from artde_gym.arrays import Array
 from artde_gym.errors import RobotError
 from artde_gym.multibody.spec import RobotSpec, Vector
 from artde_gym.sim.mujoco_world import FIELDS, Blueprint, Fields, MujocoWorld
-from artde_gym.sim.rotation import rotated
+from artde_gym.sim.rotation import rotate
 
 mj: Any = mujoco  # compiled, without type information
 
@@ -89,32 +89,32 @@ class MujocoBatch:
         self._batch.state[:] = state["state"]
         self._forces[:] = state["forces"]
 
-    def place(self, world: int, position: Vector, q: Array) -> None:
+    def reset(self, world: int, position: Vector, q: Array) -> None:
         """Put the upright robot of a world at `position` (m), the joints at `q`, all at rest, without a payload."""
         self.worlds[world].release_payload()
         self._batch.reset(np.array([world]), stage=mj.mjtStage.mjSTAGE_NONE)
         self._pose[world, :7] = (*position, 1.0, 0.0, 0.0, 0.0)
         self._pose[world, self._angles] = q
 
-    def snapshot(self, world: int) -> int:
+    def save_state(self, world: int) -> int:
         """Remember the state of a world without a payload; returns a handle."""
         parts = (self._batch.state, self._forces, self._friction)
         state, forces, friction = (part[world].copy() for part in parts)
         self._snapshots.append((state, forces, friction))
         return len(self._snapshots) - 1
 
-    def restore(self, worlds: Ids, snapshot: int) -> None:
+    def restore_state(self, worlds: Ids, snapshot: int) -> None:
         """Return to a snapshot in some worlds, bit for bit; payloads are gone."""
         for world in worlds.tolist():
             self.worlds[world].release_payload()
         self._batch.state[worlds], self._forces[worlds], self._friction[worlds] = self._snapshots[snapshot]
 
-    def read(self) -> States:
+    def state(self) -> States:
         """The states now; views, where possible, of what the next step changes."""
         x, y, z, w, i, j, k = self._pose[:, :7].T
         vx, vy, vz, wx, wy, wz = self._twist[:, :6].T
         quat = (i, j, k, w)
-        return States(*self.joints(), (x, y, z), quat, (vx, vy, vz), rotated((wx, wy, wz), quat))
+        return States(*self.joints(), (x, y, z), quat, (vx, vy, vz), rotate((wx, wy, wz), quat))
 
     def joints(self, worlds: Ids | slice = slice(None)) -> tuple[Array, Array]:
         """q and qd (n, joints) of some worlds; of all of them views."""

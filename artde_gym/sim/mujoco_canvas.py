@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from artde_gym.errors import OptionError
 from artde_gym.multibody.spec import Vector
 from artde_gym.sim.camera import Camera
-from artde_gym.sim.engine import PAYLOAD_COLOUR, PAYLOAD_LOOK
+from artde_gym.sim.engine import PAYLOAD_COLOR, PAYLOAD_LOOK
 
 mj: Any = mujoco  # compiled, without type information
 
@@ -58,9 +58,9 @@ class Canvas:
         everything = mj.mjtCatBit.mjCAT_ALL.value
         mj.mjv_updateScene(self._model, data, mj.MjvOption(), None, eye, everything, scene)
         if ball is not None and ball[2] > -PAYLOAD_LOOK:  # the ground, which would hide it, is not drawn
-            size, colour = np.full(3, PAYLOAD_LOOK), np.array(PAYLOAD_COLOUR, dtype=np.float32)
+            size, color = np.full(3, PAYLOAD_LOOK), np.array(PAYLOAD_COLOR, dtype=np.float32)
             shape = mj.mjtGeom.mjGEOM_SPHERE
-            mj.mjv_initGeom(scene.geoms[scene.ngeom], shape, size, np.array(ball), np.eye(3).ravel(), colour)
+            mj.mjv_initGeom(scene.geoms[scene.ngeom], shape, size, np.array(ball), np.eye(3).ravel(), color)
             scene.ngeom += 1
         picture = np.empty((camera.height, camera.width, 3), dtype=np.uint8)
         depth = np.empty((camera.height, camera.width), dtype=np.float32)

@@ -15,7 +15,7 @@ from artde_gym.arrays import Array
 from artde_gym.errors import OptionError
 from artde_gym.multibody.spec import RobotSpec, Vector
 from artde_gym.sim.camera import FIELD_OF_VIEW, Camera
-from artde_gym.sim.engine import PAYLOAD_COLOUR, PAYLOAD_LOOK, State
+from artde_gym.sim.engine import PAYLOAD_COLOR, PAYLOAD_LOOK, State
 from artde_gym.sim.mujoco_world import Blueprint
 
 mj: Any = mujoco  # compiled, without type information
@@ -90,7 +90,7 @@ class MujocoWindow:
         mj.mjv_updateScene(self._model, self._data, mj.MjvOption(), None, self._eye, everything, self._scene)
         self._shape(mj.mjtGeom.mjGEOM_BOX, (0.0, 0.0, -0.01), (30.0, 30.0, 0.01), GROUND)
         if payload is not None:
-            self._shape(mj.mjtGeom.mjGEOM_SPHERE, payload, (PAYLOAD_LOOK, 0.0, 0.0), PAYLOAD_COLOUR)
+            self._shape(mj.mjtGeom.mjGEOM_SPHERE, payload, (PAYLOAD_LOOK, 0.0, 0.0), PAYLOAD_COLOR)
         for tail, tip, _ in self._arrows:
             shape = self._shape(mj.mjtGeom.mjGEOM_ARROW, tail, (THIN, THIN, THIN), RED)
             mj.mjv_connector(shape, mj.mjtGeom.mjGEOM_ARROW, THIN, np.array(tail), np.array(tip))

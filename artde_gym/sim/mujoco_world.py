@@ -53,7 +53,7 @@ class Blueprint:
 
 
 class Fields(NamedTuple):
-    """`FIELDS` of one world, and `pushes`, its applied forces and torques at the centres of mass (bodies, 6)."""
+    """`FIELDS` of one world, and `pushes`, its applied forces and torques at the centers of mass (bodies, 6)."""
 
     body_mass: Array
     body_inertia: Array
@@ -85,13 +85,13 @@ class MujocoWorld(abc.ABC):
     @abc.abstractmethod
     def foot_loads(self) -> tuple[float, ...]: ...
 
-    def push(self, site: str, force: Vector) -> None:
+    def apply_force(self, site: str, force: Vector) -> None:
         number, data = self._site(site), self.placed()
         body = self._blueprint.model.site_bodyid[number]
         arm = data.site_xpos[number] - data.xipos[body]
         self.add_force(body, force, np.cross(arm, force))
 
-    def load_base(self, force: Vector, torque: Vector) -> None:
+    def apply_world_wrench(self, force: Vector, torque: Vector) -> None:
         """See `artde_gym.sim.engine.World`."""
         self.add_force(self._blueprint.base, force, torque)
 
@@ -113,7 +113,7 @@ class MujocoWorld(abc.ABC):
         return sites[name]
 
     def add_force(self, body: int, force: Vector, torque: Vector | NDArray[Any]) -> None:
-        """Add a force and a torque (world axes) at a body's centre of mass, for the next step only."""
+        """Add a force and a torque (world axes) at a body's center of mass, for the next step only."""
         self._fields.pushes[body] += (*force, *torque)
 
     def set_friction(self, coefficient: float) -> None:

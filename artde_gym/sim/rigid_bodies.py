@@ -9,7 +9,7 @@ drifts may be made one. The error of this splitting is of second order:
 drift h:   p <- p + h v,   q <- q (1, w / |w| tan(h |w| / 2)) / norm
 kick h:    v <- v + h (F / m + g),   w <- w + h w',   I w' = tau - w_m x I w_m
 
-with p, v of the centre of mass in world axes, q from body to world, and w, I, tau in body axes about the centre of
+with p, v of the center of mass in world axes, q from body to world, and w, I, tau in body axes about the center of
 mass. w_m = w + h/2 w' of the kick before belongs to the middle of the kick.
 """
 
@@ -30,7 +30,7 @@ _NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 
 
 class MassProperties(NamedTuple):
-    """Of one rigid body: mass (kg), centre of mass in the body frame (m), inertia about it (3, 3) (kg m^2)."""
+    """Of one rigid body: mass (kg), center of mass in the body frame (m), inertia about it (3, 3) (kg m^2)."""
 
     mass: float
     com: Vector
@@ -53,7 +53,7 @@ class RigidBodies:
     """The states of `n` bodies.
 
     Attributes:
-        com, com_velocity: of the centres of mass (3, n) (m, m/s), world axes.
+        com, com_velocity: of the centers of mass (3, n) (m, m/s), world axes.
         quat_xyzw: body to world (4, n).
         rot: the same as matrices (3, 3, n).
         rates: angular velocities (3, n) (rad/s), body axes.
@@ -65,7 +65,7 @@ class RigidBodies:
 
         self.com, self.com_velocity, self.rates = zeros(3), zeros(3), zeros(3)
         self.quat_xyzw, self.rot = zeros(4), zeros(3, 3)
-        self._arm, self._arm_cross = zeros(3), zeros(3, 3)  # of the centre of mass, body axes; and the matrix -arm x
+        self._arm, self._arm_cross = zeros(3), zeros(3, 3)  # of the center of mass, body axes; and the matrix -arm x
         self._inverse_mass = zeros()
         self._inertia, self._inverse_inertia = zeros(3, 3), zeros(3, 3)
         self._acceleration = zeros(3)  # w' of the last kick
@@ -188,7 +188,7 @@ def cross(a: Array, b: Array) -> Array:
     return a.take(_NEXT, 0) * b.take(_LAST, 0) - a.take(_LAST, 0) * b.take(_NEXT, 0)
 
 
-def turned(rot: Array, vectors: Array) -> Array:
+def rotate_frames(rot: Array, vectors: Array) -> Array:
     """Attitudes (3, 3, n) turned about `vectors` (3, n) in body axes by angles of 2 atan(|v| / 2), about |v|."""
     half = 0.5 * vectors
     square = half * half

@@ -15,7 +15,7 @@ Quaternion: TypeAlias = tuple[float, float, float, float]
 """x, y, z, w: the vector part first, as SciPy and PyBullet have it."""
 
 
-def rotated(
+def rotate(
     vector: tuple[Number, Number, Number], quat_xyzw: tuple[Number, Number, Number, Number]
 ) -> tuple[Number, Number, Number]:
     """R(quat) vector = v + w t + u x t with t = 2 u x v, u and w being the parts of the quaternion; elementwise."""
@@ -24,7 +24,7 @@ def rotated(
     return vx + w * tx + y * tz - z * ty, vy + w * ty + z * tx - x * tz, vz + w * tz + x * ty - y * tx
 
 
-def moved(velocity: Vector, spin: Vector, arm: Vector) -> Vector:
+def point_velocity(velocity: Vector, spin: Vector, arm: Vector) -> Vector:
     """Velocity v + w x r of a body's point at `arm` from the point that has `velocity`."""
     (vx, vy, vz), (wx, wy, wz), (ax, ay, az) = velocity, spin, arm
     return vx + wy * az - wz * ay, vy + wz * ax - wx * az, vz + wx * ay - wy * ax

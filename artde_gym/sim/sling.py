@@ -22,7 +22,7 @@ from artde_gym.multibody.spec import Vector
 from artde_gym.sim.cable import FLOATS, Body, Load, cross, dot, drag, minus, plus, pull, scaled, times, transposed_times
 from artde_gym.sim.camera import Camera
 from artde_gym.sim.engine import Engine, State
-from artde_gym.sim.rotation import matrix, moved
+from artde_gym.sim.rotation import matrix, point_velocity
 
 NOTHING: Vector = (0.0, 0.0, 0.0)
 CURVE = 48  # pieces of a cable in pictures
@@ -66,14 +66,14 @@ class Sling:
         self._force, self._torque = NOTHING, NOTHING  # on the base in the next step: world axes, body axes
         self.tension = 0.0
 
-    def place(self, position: Vector, q: Array) -> None:
+    def reset(self, position: Vector, q: Array) -> None:
         """See `artde_gym.sim.engine.Engine`; a load is gone, as in `restore`."""
         self._clear()
-        self._engine.place(position, q)
+        self._engine.reset(position, q)
 
-    def restore(self, snapshot: int) -> None:
+    def restore_state(self, snapshot: int) -> None:
         self._clear()
-        self._engine.restore(snapshot)
+        self._engine.restore_state(snapshot)
 
     def scale_masses(
         self, factor: float, links: Mapping[str, float] = MappingProxyType({}), armature: float = 1.0
@@ -97,14 +97,14 @@ class Sling:
         self._clear()
         self._hanging = _Hanging(mass, minus(hook, self._engine.spec.base.com), length)
         self.held = True
-        point, velocity = self.hook(self._engine.read())
+        point, velocity = self.hook(self._engine.state())
         self._position, self._velocity = minus(point, (0.0, 0.0, length)), velocity
 
     def release_payload(self) -> None:
         self.held, self._fixed, self.tension = False, None, 0.0
         self._engine.release_payload()
 
-    def push(self, site: str, force: Vector) -> None:
+    def apply_force(self, site: str, force: Vector) -> None:
         """See `artde_gym.sim.engine.Engine`; the site `payload` is that of whatever payload there is, if any."""
         if site == PAYLOAD:
             self._push_payload(force)
@@ -113,13 +113,13 @@ class Sling:
         if self._hanging is not None and site in self._sites:
             self._add(force, self._moment(self._sites[site], force))
 
-    def push_base(self, force: Vector, torque: Vector) -> None:
-        self._engine.push_base(force, torque)
+    def apply_base_wrench(self, force: Vector, torque: Vector) -> None:
+        self._engine.apply_base_wrench(force, torque)
         if self._hanging is not None:
             self._add(times(self._rot(), force), torque)
 
-    def load_base(self, force: Vector, torque: Vector) -> None:
-        self._engine.load_base(force, torque)
+    def apply_world_wrench(self, force: Vector, torque: Vector) -> None:
+        self._engine.apply_world_wrench(force, torque)
         if self._hanging is not None:
             self._add(force, transposed_times(self._rot(), torque))
 
@@ -131,7 +131,7 @@ class Sling:
     def site(self, name: str) -> Vector:
         if name != PAYLOAD:
             return self._engine.site(name)
-        return self.payload_position() or self._engine.read().position
+        return self.payload_position() or self._engine.state().position
 
     def payload_position(self) -> Vector | None:
         return self._engine.payload_position() if self._hanging is None else self._position
@@ -140,7 +140,7 @@ class Sling:
         """Place and velocity of the hook (m, m/s), world axes, in a state of the robot."""
         hook = NOTHING if self._hanging is None else plus(self._hanging.hook, self._engine.spec.base.com)
         arm = times(matrix(state.quat_xyzw), hook)
-        return plus(state.position, arm), moved(state.velocity, state.angular_velocity, arm)
+        return plus(state.position, arm), point_velocity(state.velocity, state.angular_velocity, arm)
 
     def cable(self, state: State) -> tuple[Vector, Vector]:
         """Vector from the hook to the load (m) and its rate (m/s), world axes; zeros while nothing hangs."""
@@ -158,7 +158,7 @@ class Sling:
         """Points of the cable from the hook to the load (m), a parabola where it is slack; none while nothing hangs."""
         if not self.held:
             return []
-        (x, y, z), _ = self.hook(self._engine.read())
+        (x, y, z), _ = self.hook(self._engine.state())
         r = minus(self._position, (x, y, z))
         free = max(self.length - math.sqrt(dot(r, r)), 0.0)
         sag = math.sqrt(0.375 * free * self.length)  # of a shallow parabola that is so much longer than its chord
@@ -182,7 +182,9 @@ class Sling:
             self._pushed = plus(self._pushed, force)
         elif self._fixed is not None:
             place = minus(self._fixed, self._engine.spec.base.com)
-            self._engine.load_base(force, times(self._rot(), cross(place, transposed_times(self._rot(), force))))
+            self._engine.apply_world_wrench(
+                force, times(self._rot(), cross(place, transposed_times(self._rot(), force)))
+            )
 
     def _moment(self, place: Vector, force: Vector) -> Vector:
         """Torque of a force (world axes) at a site about the center of mass, body axes."""
@@ -192,7 +194,7 @@ class Sling:
         self._force, self._torque = plus(self._force, force), plus(self._torque, torque)
 
     def _rot(self) -> tuple[float, float, float, float, float, float, float, float, float]:
-        return matrix(self._engine.read().quat_xyzw)
+        return matrix(self._engine.state().quat_xyzw)
 
     def _advance(self, hanging: _Hanging) -> None:
         """Move the load by a step, and let the cable pull at both ends."""
@@ -205,21 +207,21 @@ class Sling:
             body, load = self._body(step), Load(inverse_mass, self._position, velocity)
             found = pull(body, load, hanging.hook, hanging.length, step, FLOATS)
             self.tension = found.tension
-            self._engine.push_base(scaled(found.tension, found.in_body), scaled(found.tension, found.moment))
+            self._engine.apply_base_wrench(scaled(found.tension, found.in_body), scaled(found.tension, found.moment))
             velocity = minus(velocity, scaled(step * inverse_mass * found.tension, found.direction))
         self._velocity, self._position = velocity, plus(self._position, scaled(step, velocity))
         self._force = self._torque = self._pushed = NOTHING
 
     def _body(self, step: float) -> Body[float]:
         """The base, with the velocities that the next step gives it without the cable."""
-        base, state = self._engine.spec.base, self._engine.read()
+        base, state = self._engine.spec.base, self._engine.state()
         rot = matrix(state.quat_xyzw)
         mass = self._factor * base.mass
         x, y, z = base.inertia
         inertia = (self._factor * x, self._factor * y, self._factor * z)
         inverse = (1.0 / inertia[0], 1.0 / inertia[1], 1.0 / inertia[2])
         arm = times(rot, base.com)
-        velocity = moved(state.velocity, state.angular_velocity, arm)
+        velocity = point_velocity(state.velocity, state.angular_velocity, arm)
         velocity = minus(plus(velocity, scaled(step / mass, self._force)), (0.0, 0.0, step * GRAVITY))
         rates = transposed_times(rot, state.angular_velocity)
         torque = minus(self._torque, cross(rates, _each(inertia, rates)))

@@ -15,7 +15,7 @@ from artde_gym.info import fall_reason
 from artde_gym.registration import ControllerSpec
 
 
-class Shot(NamedTuple):
+class Frame(NamedTuple):
     """A picture (height, width, 3) at a time; whether the episode ended there, and why if in a fall ("" if not)."""
 
     time_s: float
@@ -24,7 +24,7 @@ class Shot(NamedTuple):
     fall_reason: str
 
 
-def shots(
+def render_frames(
     env_id: str,
     kwargs: Mapping[str, Any],
     policy: Policy | ControllerSpec,
@@ -32,7 +32,7 @@ def shots(
     seed: int,
     times: Iterable[float],
     width: int,
-) -> Iterator[Shot]:
+) -> Iterator[Frame]:
     """Run one episode in an environment of its own, with a picture at the first sample at or after each time (s).
 
     The last picture is that of the episode's end, if it comes before the last time.
@@ -58,7 +58,7 @@ def shots(
                 observation, _, terminated, truncated, info = env.step(action)
                 first, over = False, terminated or truncated
             reason = fall_reason(info)
-            yield Shot(info["time_s"], env.render(), over, reason)
+            yield Frame(info["time_s"], env.render(), over, reason)
             if over:
                 return
     finally:

@@ -12,17 +12,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from artde_gym.arguments import number, whole
+from artde_gym.arguments import check_integer, check_number
 from artde_gym.errors import OptionError
-from artde_gym.evaluation.cells import Cell, tried
+from artde_gym.evaluation.cells import Cell, validate_cell
 from artde_gym.evaluation.environments import arguments_of
 from artde_gym.evaluation.plan import Plan
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.scenarios import SCENARIOS
 from artde_gym.video import writer
-from artde_gym.video.frames import Shot, shots
-from artde_gym.video.tiles import panels
+from artde_gym.video.frames import Frame, render_frames
+from artde_gym.video.tiles import tile_frames
 
 SPEEDS = (0.001, 1000.0)
 """Slowest and fastest, shown over simulated time."""
@@ -62,7 +62,7 @@ def video(
         speed: 0.5 shows it half as fast.
         fps: pictures a second of the video; 50 at most in a GIF and 90 in a WebP, as browsers slow down faster ones.
         width: of one controller's panel (pixels), whose height is three quarters of it.
-        columns: panels in a row; None for all of them.
+        columns: tiles in a row; None for all of them.
         on_progress: called with the simulated time (s) of each picture.
 
     Returns:
@@ -73,11 +73,11 @@ def video(
             or ffmpeg is missing.
     """
     out = Path(out)
-    speed = number("speed", speed, *SPEEDS, "a number from {:g} to {:g}".format(*SPEEDS))
-    start = number("start", start, 0.0, sys.float_info.max, "a finite number >= 0 (s)")
-    end = number("end", end, math.nextafter(start, math.inf), math.inf, f"a number > the start, {start:g} (s)")
-    columns = None if columns is None else whole("columns", columns, 1)
-    own_seed = episode_seed(whole("seed", seed, 0), whole("episode", episode, 0))
+    speed = check_number("speed", speed, *SPEEDS, "a number from {:g} to {:g}".format(*SPEEDS))
+    start = check_number("start", start, 0.0, sys.float_info.max, "a finite number >= 0 (s)")
+    end = check_number("end", end, math.nextafter(start, math.inf), math.inf, f"a number > the start, {start:g} (s)")
+    columns = None if columns is None else check_integer("columns", columns, 1)
+    own_seed = episode_seed(check_integer("seed", seed, 0), check_integer("episode", episode, 0))
     writer.check(out)
     plan = Plan.of(
         controllers, env_id, scenario=scenario, seed=seed, disturbances=disturbances, env_kwargs=env_kwargs, gains=gains
@@ -85,8 +85,8 @@ def video(
     (cell,) = plan.cells
     fps = writer.frame_rate(out, fps)
     _check_part(out, cell, start, end, speed / fps)
-    films = {
-        name: shots(
+    videos = {
+        name: render_frames(
             cell.env_id,
             cell.kwargs,
             policy,
@@ -102,13 +102,13 @@ def video(
     title += f"; seed {seed}, episode {episode}" + ("" if speed == 1 else f"; {speed:g} x speed")
 
     def pictures() -> Iterator[NDArray[np.uint8]]:
-        for shown in _together(films, held=math.ceil(HELD * fps)):
-            reached = max(shot.time_s for shot in shown.values())
+        for shown in _together(videos, held=math.ceil(HELD * fps)):
+            reached = max(frame.time_s for frame in shown.values())
             if reached < start - EARLY:  # nobody is there any more
                 raise OptionError("start", start, f"up to the end of the episode, {reached:g} s")
             if on_progress is not None:
                 on_progress(reached)
-            yield panels(shown, title, min(columns or len(shown), len(shown)))
+            yield tile_frames(shown, title, min(columns or len(shown), len(shown)))
 
     writer.write(out, pictures(), fps)
     return out
@@ -116,7 +116,7 @@ def video(
 
 def _check_part(out: Path, cell: Cell, start: float, end: float, step: float) -> None:
     """See that the part to be shown begins within the episode, and that its pictures are not too many."""
-    tried("single", cell)
+    validate_cell(False, cell)
     duration = cell.kwargs.get("duration", arguments_of(cell.env_id)["duration"].default)
     if start > duration:
         raise OptionError("start", start, f"up to the end of the episode, {duration:g} s")
@@ -129,14 +129,14 @@ def _times(start: float, end: float, step: float) -> Iterator[float]:
     return itertools.takewhile(lambda time: time < end, (start + step * i for i in itertools.count()))
 
 
-def _together(films: Mapping[str, Iterator[Shot]], held: int) -> Iterator[dict[str, Shot]]:
-    """Instant by instant what each film shows, its last picture after its end; `held` more in the very end."""
-    shown: dict[str, Shot] = {}
+def _together(videos: Mapping[str, Iterator[Frame]], held: int) -> Iterator[dict[str, Frame]]:
+    """Instant by instant what each video shows, its last picture after its end; `held` more in the very end."""
+    shown: dict[str, Frame] = {}
     while True:
-        fresh = {name: shot for name, film in films.items() if (shot := next(film, None)) is not None}
+        fresh = {name: frame for name, video in videos.items() if (frame := next(video, None)) is not None}
         if not fresh:
             break
-        shown = {name: fresh.get(name) or shown[name] for name in films}
+        shown = {name: fresh.get(name) or shown[name] for name in videos}
         yield shown
-    if any(shot.over for shot in shown.values()):
+    if any(frame.over for frame in shown.values()):
         yield from itertools.repeat(shown, held)

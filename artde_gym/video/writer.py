@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from artde_gym.arguments import number
+from artde_gym.arguments import check_number
 from artde_gym.errors import OptionError
 
 Picture = NDArray[np.uint8]
@@ -28,7 +28,7 @@ FASTEST = {".gif": 50.0, ".webp": 90.0}
 """Suffix -> most pictures a second: browsers show what is shorter than 2 and 11 units for a tenth of a second."""
 RATES = (0.01, 1000.0)
 """Slowest and fastest that can be asked for, pictures a second."""
-COLOURS = 192  # of a GIF
+COLORS = 192  # of a GIF
 SAMPLED = 12  # pictures that a GIF's palette is made of
 QUALITY = 75  # of a WebP
 
@@ -52,7 +52,7 @@ def frame_rate(out: Path, fps: float) -> float:
         OptionError: for one that is not within `RATES`.
     """
     slowest, fastest = RATES
-    given = number("fps", fps, slowest, fastest, f"a number from {slowest:g} to {fastest:g}")
+    given = check_number("fps", fps, slowest, fastest, f"a number from {slowest:g} to {fastest:g}")
     return round(given, 2) if out.suffix in CODECS else min(given, FASTEST.get(out.suffix, fastest))
 
 
@@ -101,10 +101,10 @@ def _encode(out: Path, pictures: Iterator[Picture], fps: float) -> None:
 
 
 def _gif(out: Path, pictures: Iterator[Picture], fps: float) -> None:
-    """With one palette for all pictures, so that still parts stay still: rare colours of any of them are in it."""
+    """With one palette for all pictures, so that still parts stay still: rare colors of any of them are in it."""
     frames = [Image.fromarray(picture) for picture in pictures]
     sample = np.concatenate([np.asarray(frame) for frame in frames[:: -(-len(frames) // SAMPLED)] + frames[-1:]])
-    palette = Image.fromarray(sample).quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
+    palette = Image.fromarray(sample).quantize(COLORS, Image.Quantize.MAXCOVERAGE)
     _animate(out, [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames], fps, optimize=True)
 
 

@@ -6,15 +6,15 @@ from typing import get_args
 
 import numpy as np
 
-from artde_gym.doctor.outcome import Outcome
+from artde_gym.doctor.check_result import CheckResult
 from artde_gym.multibody.dynamics import RigidBodyTree, joint_space_inertia
 from artde_gym.robots.ojas.model import ActuatorInertia, ojas
 from artde_gym.robots.ojas.walking import walking_pattern
-from controllers.checkup import REMEDY, judged
 from controllers.design import preset_designs
 from controllers.drive import Drive
 from controllers.loop import Loop
 from controllers.presets.ojas import OJAS, OJAS_RANGES
+from controllers.stability_check import REMEDY, judged
 
 INVALID = "none"
 """The actuator model that is there to show what happens outside (0, 2)."""
@@ -33,18 +33,18 @@ def loops(*, actuator_inertia: ActuatorInertia = "rotor", speed: float = 0.1, st
     return [Loop("joints", spec.actuated, "kg m^2", _SAMPLED * np.arange(len(inertia)), inertia)]
 
 
-def stability() -> list[Outcome]:
+def stability() -> list[CheckResult]:
     """Judge the presets with every actuator model, along the walk at the default speed."""
     return [_judged(actuator) for actuator in get_args(ActuatorInertia)]
 
 
-def _judged(actuator: ActuatorInertia) -> Outcome:
+def _judged(actuator: ActuatorInertia) -> CheckResult:
     (loop,) = loops(actuator_inertia=actuator)
     valid, found = judged(preset_designs(loop, DRIVE, tuned=False))
     what = f"biped, actuators {actuator!r}"
     if actuator == INVALID and not valid:
-        return Outcome(what, "ok", f"{found}: outside, as its documentation says")
-    return Outcome(what, "ok", found) if valid else Outcome(what, "failed", found, REMEDY)
+        return CheckResult(what, "ok", f"{found}: outside, as its documentation says")
+    return CheckResult(what, "ok", found) if valid else CheckResult(what, "failed", found, REMEDY)
 
 
 DRIVE = Drive("ojas", OJAS, OJAS_RANGES, period=0.001, loops=loops, stability=stability)

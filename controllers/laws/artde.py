@@ -20,10 +20,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from controllers.laws.errors import GainError
-from controllers.laws.tde import TdeGains, TdeMemory, tde_start, time_delay
+from controllers.laws.tde import TdeGains, TdeState, tde_init, time_delay
 from controllers.laws.tracking import (
     Array,
-    Signals,
+    JointInput,
     check_non_negative,
     check_positive_number,
     desired_acceleration,
@@ -77,51 +77,51 @@ class ArtdeGains(TdeGains):
             raise GainError("cap", self.cap, f"a number >= beta_start = {self.beta_start:g}")
 
 
-class ArtdeMemory(NamedTuple):
+class ArtdeState(NamedTuple):
     """TDE's memory, the sliding variable s (..., n), the gains for the next sample (...), and c for those who look."""
 
-    tde: TdeMemory
+    tde: TdeState
     s: Array
     beta_0: Array
     beta_1: Array
     c: Array
 
 
-def artde_start(gains: ArtdeGains, signals: Signals, period: float) -> ArtdeMemory:
+def artde_init(gains: ArtdeGains, signals: JointInput, period: float) -> ArtdeState:
     """Memory before the first sample, as if s had been the same just before."""
     s = sliding_variable(*errors(signals), gains.k_p, gains.k_d)
     beta = np.full(s.shape[:-1], gains.beta_start, dtype=s.dtype)
-    return ArtdeMemory(tde_start(signals, period), s, beta, beta, beta)
+    return ArtdeState(tde_init(signals, period), s, beta, beta, beta)
 
 
 def artde(
-    gains: ArtdeGains, memory: ArtdeMemory, signals: Signals, period: float, du: Array | None = None
-) -> tuple[Array, ArtdeMemory]:
+    gains: ArtdeGains, state: ArtdeState, signals: JointInput, period: float, du: Array | None = None
+) -> tuple[Array, ArtdeState]:
     """One sample of the law at the top; `du` (..., n) is added to the robust term."""
     e, ed = errors(signals)
     s = sliding_variable(e, ed, gains.k_p, gains.k_d)
     s_squared = inner(s, s)
     xi = np.sqrt(inner(e, e) + inner(ed, ed))
-    c = memory.beta_0 + memory.beta_1 * xi
+    c = state.beta_0 + state.beta_1 * xi
     robust = (gains.alpha * c / np.sqrt(s_squared + gains.eps))[..., None] * s
     u = desired_acceleration(signals, e, ed, gains.k_p, gains.k_d) + robust
-    tau, memory_tde = time_delay(gains.m_bar, memory.tde, signals, u if du is None else u + du, period)
-    return tau, ArtdeMemory(memory_tde, s, *_adapt(gains, memory, s, s_squared, xi, period), c)
+    tau, tde_state = time_delay(gains.m_bar, state.tde, signals, u if du is None else u + du, period)
+    return tau, ArtdeState(tde_state, s, *_adapt(gains, state, s, s_squared, xi, period), c)
 
 
 def _adapt(
-    gains: ArtdeGains, memory: ArtdeMemory, s: Array, s_squared: Array, xi: Array, period: float
+    gains: ArtdeGains, state: ArtdeState, s: Array, s_squared: Array, xi: Array, period: float
 ) -> tuple[Array, Array]:
     """The gains for the next sample."""
     weight = np.sqrt(s_squared)
     if gains.growth == "midpoint":
-        before = inner(memory.s, memory.s)
+        before = inner(state.s, state.s)
         grows = s_squared > before
         weight = 0.5 * (weight + np.sqrt(before))
     else:
-        grows = s_squared > inner(s, memory.s)  # s_k^T (s_k - s_k-1) > 0
+        grows = s_squared > inner(s, state.s)  # s_k^T (s_k - s_k-1) > 0
     if not gains.clamp:
-        grows = grows | (memory.beta_0 <= gains.beta_floor) | (memory.beta_1 <= gains.beta_floor)
+        grows = grows | (state.beta_0 <= gains.beta_floor) | (state.beta_1 <= gains.beta_floor)
     signed = signed_step(period * weight, grows)
 
     def moved(beta: Array, change: Array) -> Array:
@@ -132,4 +132,4 @@ def _adapt(
             beta = np.maximum(beta, gains.beta_floor)
         return np.minimum(beta, gains.cap) if math.isfinite(gains.cap) else beta
 
-    return moved(memory.beta_0, gains.gamma_0 * signed), moved(memory.beta_1, gains.gamma_1 * (xi * signed))
+    return moved(state.beta_0, gains.gamma_0 * signed), moved(state.beta_1, gains.gamma_1 * (xi * signed))

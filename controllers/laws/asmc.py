@@ -27,7 +27,7 @@ from controllers.laws.errors import GainError
 from controllers.laws.tracking import (
     Array,
     Gain,
-    Signals,
+    JointInput,
     check_non_negative,
     check_positive,
     check_positive_number,
@@ -80,7 +80,7 @@ class AsmcGains:
             raise GainError("r_max", self.r_max, "a finite number >= 1")
 
 
-class AsmcMemory(NamedTuple):
+class AsmcState(NamedTuple):
     """The sliding variable s (..., n), and the gain and the inertia's ratio for the next sample (...)."""
 
     s: Array
@@ -88,28 +88,28 @@ class AsmcMemory(NamedTuple):
     r: Array
 
 
-def asmc_start(gains: AsmcGains, signals: Signals) -> AsmcMemory:
+def asmc_init(gains: AsmcGains, signals: JointInput) -> AsmcState:
     """Memory before the first sample: the inertia's ratio is the one for which the force that acts holds the weight."""
     e, ed = errors(signals)
     s = ed + gains.slope * e
     c = np.full(s.shape[:-1], gains.c_floor, dtype=s.dtype)
     if not gains.gravity:
-        return AsmcMemory(s, c, np.ones_like(c))
+        return AsmcState(s, c, np.ones_like(c))
     weight = times(gains.m_bar, _lifted(gains, np.zeros_like(s)))
-    return AsmcMemory(s, c, _bounded(gains, inner(signals.tau_applied, weight) / inner(weight, weight)))
+    return AsmcState(s, c, _bounded(gains, inner(signals.tau_applied, weight) / inner(weight, weight)))
 
 
-def asmc(gains: AsmcGains, memory: AsmcMemory, signals: Signals, period: float) -> tuple[Array, AsmcMemory]:
+def asmc(gains: AsmcGains, state: AsmcState, signals: JointInput, period: float) -> tuple[Array, AsmcState]:
     """One sample of the law at the top; what sample k teaches acts from k + 1 on."""
     e, ed = errors(signals)
     s = ed + gains.slope * e
     s_squared = inner(s, s)
-    reach = gains.k_s + memory.c / np.sqrt(s_squared + gains.eps)
+    reach = gains.k_s + state.c / np.sqrt(s_squared + gains.eps)
     lifted = _lifted(gains, signals.qdd_ref + gains.slope * ed + reach[..., None] * s)
-    tau = memory.r[..., None] * times(gains.m_bar, lifted)
-    c = memory.c + period * (gains.gamma_c * np.sqrt(s_squared) - gains.leakage_c * (memory.c - gains.c_floor))
-    r = memory.r + period * (gains.gamma_r * inner(s, lifted) - gains.leakage_r * (memory.r - 1.0))
-    return tau, AsmcMemory(s, c, _bounded(gains, r))
+    tau = state.r[..., None] * times(gains.m_bar, lifted)
+    c = state.c + period * (gains.gamma_c * np.sqrt(s_squared) - gains.leakage_c * (state.c - gains.c_floor))
+    r = state.r + period * (gains.gamma_r * inner(s, lifted) - gains.leakage_r * (state.r - 1.0))
+    return tau, AsmcState(s, c, _bounded(gains, r))
 
 
 def _lifted(gains: AsmcGains, u: Array) -> Array:

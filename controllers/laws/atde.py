@@ -17,10 +17,10 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.laws.errors import GainError
-from controllers.laws.tde import TdeGains, TdeMemory, tde_start, time_delay
+from controllers.laws.tde import TdeGains, TdeState, tde_init, time_delay
 from controllers.laws.tracking import (
     Array,
-    Signals,
+    JointInput,
     check_non_negative,
     check_positive_number,
     desired_acceleration,
@@ -59,30 +59,30 @@ class AtdeGains(TdeGains):
             raise GainError("c_start", self.c_start, f"a finite number >= c_floor = {self.c_floor:g}")
 
 
-class AtdeMemory(NamedTuple):
+class AtdeState(NamedTuple):
     """TDE's memory, the sliding variable s (..., n), and the gain for the next sample (...)."""
 
-    tde: TdeMemory
+    tde: TdeState
     s: Array
     c: Array
 
 
-def atde_start(gains: AtdeGains, signals: Signals, period: float) -> AtdeMemory:
+def atde_init(gains: AtdeGains, signals: JointInput, period: float) -> AtdeState:
     """Memory before the first sample, as if s had been the same just before."""
     s = sliding_variable(*errors(signals), gains.k_p, gains.k_d)
-    return AtdeMemory(tde_start(signals, period), s, np.full(s.shape[:-1], gains.c_start, dtype=s.dtype))
+    return AtdeState(tde_init(signals, period), s, np.full(s.shape[:-1], gains.c_start, dtype=s.dtype))
 
 
 def atde(
-    gains: AtdeGains, memory: AtdeMemory, signals: Signals, period: float, du: Array | None = None
-) -> tuple[Array, AtdeMemory]:
+    gains: AtdeGains, state: AtdeState, signals: JointInput, period: float, du: Array | None = None
+) -> tuple[Array, AtdeState]:
     """One sample of the law at the top; `du` (..., n) is added to the robust term."""
     e, ed = errors(signals)
     s = sliding_variable(e, ed, gains.k_p, gains.k_d)
     s_squared = inner(s, s)
-    robust = (gains.alpha * memory.c / np.sqrt(s_squared + gains.eps))[..., None] * s
-    grows = (memory.c <= gains.c_floor) | (s_squared > inner(memory.s, memory.s))
+    robust = (gains.alpha * state.c / np.sqrt(s_squared + gains.eps))[..., None] * s
+    grows = (state.c <= gains.c_floor) | (s_squared > inner(state.s, state.s))
     change = signed_step((period * gains.gamma_0) * np.sqrt(s_squared), grows)
     u = desired_acceleration(signals, e, ed, gains.k_p, gains.k_d) + robust
-    tau, memory_tde = time_delay(gains.m_bar, memory.tde, signals, u if du is None else u + du, period)
-    return tau, AtdeMemory(memory_tde, s, memory.c + change)
+    tau, tde_state = time_delay(gains.m_bar, state.tde, signals, u if du is None else u + du, period)
+    return tau, AtdeState(tde_state, s, state.c + change)

@@ -12,7 +12,7 @@ average since the sample before:
 
 The attitude law sees q = -e_q, q_ref = 0, qd = w, qd_ref = R^T R_d w_d, so that e = e_q and ed = e_w, and the
 acceleration qdd_ref = R^T R_d alpha_d - w x (R^T R_d w_d) that keeps both where they are. So any law of
-`controllers.laws` on `Signals` serves in either loop. alpha_d = (w_d,k+1 - w_d,k) / L is the mean over the coming
+`controllers.laws` on `JointInput` serves in either loop. alpha_d = (w_d,k+1 - w_d,k) / L is the mean over the coming
 period; the filter's pointwise acceleration, which jumps with its input, crashes at the thesis' gains. (The yaw's own
 acceleration is in no observation and taken for zero.)
 
@@ -33,11 +33,11 @@ import numpy as np
 
 from controllers.laws.attitude import attitude_error, desired_axes, desired_rates, heading
 from controllers.laws.errors import GainError
-from controllers.laws.second_order import FilterMemory, second_order
+from controllers.laws.second_order import FilterState, second_order
 from controllers.laws.tracking import (
     Array,
+    JointInput,
     Law,
-    Signals,
     check_positive_number,
     components,
     is_finite,
@@ -57,7 +57,7 @@ from controllers.laws.vectors import (
 )
 
 
-class Flight(NamedTuple):
+class QuadrotorInput(NamedTuple):
     """One sample of a quadrotor.
 
     Attributes:
@@ -128,7 +128,7 @@ class CascadeGains:
             raise GainError("attitude_error", self.attitude_error, "'desired', 'printed'")
 
 
-class CascadeMemory(NamedTuple):
+class CascadeState(NamedTuple):
     """What one sample leaves for the next; the body's and the desired axes are those of the sample itself.
 
     Attributes:
@@ -140,21 +140,23 @@ class CascadeMemory(NamedTuple):
 
     position: Any
     attitude: Any
-    command: FilterMemory
+    command: FilterState
     force: Array
     axes: Axes
     axes_ref: Axes
 
 
-def cascade_start(position: Law, attitude: Law, gains: CascadeGains, flight: Flight, period: float) -> CascadeMemory:
+def cascade_init(
+    position: Law, attitude: Law, gains: CascadeGains, flight: QuadrotorInput, period: float
+) -> CascadeState:
     """Memory before the first sample: as if the thrust that acts had been asked for, at rest, for long."""
     outer = _position_signals(flight, joined(scaled(flight.thrust_applied, flight.axes[2])))
     force = joined(_within_reach(gains, components(outer.tau_applied)))
-    rest = FilterMemory(force, np.zeros_like(force))
+    rest = FilterState(force, np.zeros_like(force))
     command = rest if gains.command == "filtered" else _reference_command(gains, force, flight)
     axes_ref, rates_ref = _attitude_command(command, flight, 0.0)
     inner = _attitude_signals(gains, flight, axes_ref, rates_ref, scaled(0.0, rates_ref))
-    return CascadeMemory(
+    return CascadeState(
         position.start(gains.position, outer, period),
         attitude.start(gains.attitude, inner, period),
         command,
@@ -165,35 +167,35 @@ def cascade_start(position: Law, attitude: Law, gains: CascadeGains, flight: Fli
 
 
 def cascade(
-    position: Law, attitude: Law, gains: CascadeGains, memory: CascadeMemory, flight: Flight, period: float
-) -> tuple[Array, CascadeMemory]:
+    position: Law, attitude: Law, gains: CascadeGains, state: CascadeState, flight: QuadrotorInput, period: float
+) -> tuple[Array, CascadeState]:
     """One sample of the cascade at the top: the wrench [u1 (N), u2, u3, u4 (Nm)] (..., 4), and its memory."""
     if gains.remembered_force == "applied":
-        thrust_axis = scaled(0.5, plus(memory.axes[2], flight.axes[2]))
+        thrust_axis = scaled(0.5, plus(state.axes[2], flight.axes[2]))
         applied = joined(scaled(flight.thrust_applied, thrust_axis))
     else:
-        applied = memory.force
-    force, position_memory = position.step(gains.position, memory.position, _position_signals(flight, applied), period)
+        applied = state.force
+    force, position_state = position.step(gains.position, state.position, _position_signals(flight, applied), period)
     reachable = _within_reach(gains, components(force))
     force = joined(reachable)
 
-    command, axes_ref, rates_ref, turning = _command(gains, memory.command, force, flight, period)
+    command, axes_ref, rates_ref, turning = _command(gains, state.command, force, flight, period)
     inner = _attitude_signals(gains, flight, axes_ref, rates_ref, turning)
-    torque, attitude_memory = attitude.step(gains.attitude, memory.attitude, inner, period)
+    torque, attitude_state = attitude.step(gains.attitude, state.attitude, inner, period)
     thrust = dot(reachable, flight.axes[2])
     wrench = joined((thrust, *components(torque)))
-    return wrench, CascadeMemory(position_memory, attitude_memory, command, force, flight.axes, axes_ref)
+    return wrench, CascadeState(position_state, attitude_state, command, force, flight.axes, axes_ref)
 
 
-def attitude_errors(gains: CascadeGains, memory: CascadeMemory, flight: Flight) -> tuple[Array, Array]:
+def attitude_errors(gains: CascadeGains, state: CascadeState, flight: QuadrotorInput) -> tuple[Array, Array]:
     """e_q and e_w (..., 3) that the attitude law is about to see, for the command "filtered" exactly."""
-    axes_ref, rates_ref = _attitude_command(memory.command, flight, 0.0)
+    axes_ref, rates_ref = _attitude_command(state.command, flight, 0.0)
     q, qd_ref = _attitude_feedback(gains, flight, axes_ref, rates_ref, _carried(flight, axes_ref, rates_ref))
     return 0.0 - q, qd_ref - flight.rates
 
 
-def _position_signals(flight: Flight, applied: Array) -> Signals:
-    return Signals(
+def _position_signals(flight: QuadrotorInput, applied: Array) -> JointInput:
+    return JointInput(
         flight.position,
         flight.velocity,
         flight.position_ref,
@@ -204,8 +206,8 @@ def _position_signals(flight: Flight, applied: Array) -> Signals:
 
 
 def _command(
-    gains: CascadeGains, before: FilterMemory, force: Array, flight: Flight, period: float
-) -> tuple[FilterMemory, Axes, Vector, Vector]:
+    gains: CascadeGains, before: FilterState, force: Array, flight: QuadrotorInput, period: float
+) -> tuple[FilterState, Axes, Vector, Vector]:
     """The command for the next sample; R_d, w_d and alpha_d of this one."""
     if gains.command == "filtered":  # the difference to the next sample, which is known already
         now, distance = before, period
@@ -218,12 +220,12 @@ def _command(
     return command, axes_ref, rates_ref, scaled(1 / distance, minus(rates_other, rates_ref))
 
 
-def _reference_command(gains: CascadeGains, force: Array, flight: Flight) -> FilterMemory:
+def _reference_command(gains: CascadeGains, force: Array, flight: QuadrotorInput) -> FilterState:
     """A force at the rate that the reference's jerk takes."""
-    return FilterMemory(force, times(gains.position.m_bar, flight.jerk_ref))
+    return FilterState(force, times(gains.position.m_bar, flight.jerk_ref))
 
 
-def _attitude_command(command: FilterMemory, flight: Flight, distance: float) -> tuple[Axes, Vector]:
+def _attitude_command(command: FilterState, flight: QuadrotorInput, distance: float) -> tuple[Axes, Vector]:
     """R_d and w_d of a force and its rate, `distance` (s) from this sample."""
     force, rate = components(command.value), components(command.rate)
     towards = heading(flight.yaw_ref + distance * flight.yaw_rate_ref, flight.yaw_rate_ref)
@@ -232,8 +234,8 @@ def _attitude_command(command: FilterMemory, flight: Flight, distance: float) ->
 
 
 def _attitude_signals(
-    gains: CascadeGains, flight: Flight, axes_ref: Axes, rates_ref: Vector, turning: Vector
-) -> Signals:
+    gains: CascadeGains, flight: QuadrotorInput, axes_ref: Axes, rates_ref: Vector, turning: Vector
+) -> JointInput:
     """What the attitude law sees, see the top; `turning` is alpha_d."""
     carried = _carried(flight, axes_ref, rates_ref)
     q, qd_ref = _attitude_feedback(gains, flight, axes_ref, rates_ref, carried)
@@ -241,11 +243,11 @@ def _attitude_signals(
     acceleration = joined(minus(turning, cross(components(flight.rates), carried)))
     if flight.turning_ref is not None:
         acceleration = acceleration + flight.turning_ref
-    return Signals(q, flight.rates, np.zeros_like(q), qd_ref, acceleration, flight.torque_applied)
+    return JointInput(q, flight.rates, np.zeros_like(q), qd_ref, acceleration, flight.torque_applied)
 
 
 def _attitude_feedback(
-    gains: CascadeGains, flight: Flight, axes_ref: Axes, rates_ref: Vector, carried: Vector
+    gains: CascadeGains, flight: QuadrotorInput, axes_ref: Axes, rates_ref: Vector, carried: Vector
 ) -> tuple[Array, Array]:
     """q and qd_ref of the attitude law; `carried` is R^T R_d w_d."""
     e = attitude_error(flight.axes, axes_ref)
@@ -257,7 +259,7 @@ def _attitude_feedback(
     return joined(scaled(-1.0, e)), joined(carried)
 
 
-def _carried(flight: Flight, axes_ref: Axes, a: Vector) -> Vector:
+def _carried(flight: QuadrotorInput, axes_ref: Axes, a: Vector) -> Vector:
     """R^T R_d a: from the desired axes to the body's."""
     return to_body(flight.axes, to_world(axes_ref, a))
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 
-from controllers.laws.tracking import Array, Gain, Signals, check_positive, desired_acceleration, errors, make_plain
+from controllers.laws.tracking import Array, Gain, JointInput, check_positive, desired_acceleration, errors, make_plain
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,7 +27,7 @@ class ComputedTorqueGains:
 
 
 def computed_torque(
-    gains: ComputedTorqueGains, signals: Signals, inverse_dynamics: Callable[[Array, Array, Array], Array]
+    gains: ComputedTorqueGains, signals: JointInput, inverse_dynamics: Callable[[Array, Array, Array], Array]
 ) -> Array:
     """One sample of the law at the top; `inverse_dynamics` turns q, qd, qdd (..., n) into torques."""
     u = desired_acceleration(signals, *errors(signals), gains.k_p, gains.k_d)

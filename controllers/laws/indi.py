@@ -16,9 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.laws.second_order import FilterMemory, check_filter, second_order
+from controllers.laws.second_order import FilterState, check_filter, second_order
 from controllers.laws.tde import TdeGains, inertia_times
-from controllers.laws.tracking import Array, Signals, desired_acceleration, errors
+from controllers.laws.tracking import Array, JointInput, desired_acceleration, errors
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,30 +38,30 @@ class IndiGains(TdeGains):
         check_filter(self.filter_rate, self.filter_damping)
 
 
-class IndiMemory(NamedTuple):
+class IndiState(NamedTuple):
     """Velocity of the sample before (..., n), and the filters of acceleration and force."""
 
     qd: Array
-    acceleration: FilterMemory
-    force: FilterMemory
+    acceleration: FilterState
+    force: FilterState
 
 
-def indi_start(signals: Signals, period: float) -> IndiMemory:
+def indi_init(signals: JointInput, period: float) -> IndiState:
     """Memory before the first sample: as if the reference acceleration and the force had been there for long."""
     rest = np.zeros_like(signals.qd)
-    return IndiMemory(
+    return IndiState(
         signals.qd - period * signals.qdd_ref,
-        FilterMemory(signals.qdd_ref, rest),
-        FilterMemory(signals.tau_applied, rest),
+        FilterState(signals.qdd_ref, rest),
+        FilterState(signals.tau_applied, rest),
     )
 
 
-def indi(gains: IndiGains, memory: IndiMemory, signals: Signals, period: float) -> tuple[Array, IndiMemory]:
+def indi(gains: IndiGains, state: IndiState, signals: JointInput, period: float) -> tuple[Array, IndiState]:
     """One sample of the law at the top."""
-    a = (signals.qd - memory.qd) / period
+    a = (signals.qd - state.qd) / period
     shape = gains.filter_rate, gains.filter_damping, period
-    acceleration = second_order(memory.acceleration, a, *shape)
-    force = second_order(memory.force, signals.tau_applied, *shape)
+    acceleration = second_order(state.acceleration, a, *shape)
+    force = second_order(state.force, signals.tau_applied, *shape)
     u = desired_acceleration(signals, *errors(signals), gains.k_p, gains.k_d)
     tau = force.value + inertia_times(gains.m_bar, u - acceleration.value)
-    return tau, IndiMemory(signals.qd, acceleration, force)
+    return tau, IndiState(signals.qd, acceleration, force)

@@ -29,12 +29,12 @@ import numpy as np
 
 from controllers.laws.positional_pid import (
     PositionalPidGains,
-    PositionalPidMemory,
+    PositionalPidState,
     positional_pid,
-    positional_pid_start,
+    positional_pid_init,
 )
 from controllers.laws.swing import GRAVITY, SHORTEST, Cable, stiffness, swing_gains
-from controllers.laws.tracking import Array, Signals, check_non_negative, check_positive_number, components
+from controllers.laws.tracking import Array, JointInput, check_non_negative, check_positive_number, components
 from controllers.laws.vectors import Vector, cross, dot, joined, minus, plus, scaled
 
 LIMIT = 2.0  # m/s^2, of each component of the integral
@@ -65,27 +65,27 @@ class LoadGains(PositionalPidGains):
         check_non_negative("load_k_i", self.load_k_i)
 
 
-class LoadMemory(NamedTuple):
+class LoadState(NamedTuple):
     """The load's integral (..., 3) (m/s^2), and the memory of the position law."""
 
     load_integral: Array
-    alone: PositionalPidMemory
+    alone: PositionalPidState
 
 
-def load_start(gains: LoadGains, signals: Signals) -> LoadMemory:
+def load_start(gains: LoadGains, signals: JointInput) -> LoadState:
     """Memory before the first sample."""
-    return LoadMemory(np.zeros_like(signals.q), positional_pid_start(gains, signals))
+    return LoadState(np.zeros_like(signals.q), positional_pid_init(gains, signals))
 
 
 def load_control(
-    gains: LoadGains, memory: LoadMemory, signals: Signals, cable: Cable, period: float
-) -> tuple[Array, LoadMemory]:
+    gains: LoadGains, state: LoadState, signals: JointInput, cable: Cable, period: float
+) -> tuple[Array, LoadState]:
     """One sample of the law at the top: F (..., 3) (N), world axes; `signals` are the vehicle's."""
     held = cable.held[..., None]
     resting = signals._replace(  # or the integral of the other law would wind up
         q_ref=np.where(held, signals.q, signals.q_ref), qd_ref=np.where(held, signals.qd, signals.qd_ref)
     )
-    alone, alone_memory = positional_pid(gains, memory.alone, resting, period)
+    alone, alone_memory = positional_pid(gains, state.alone, resting, period)
     r = components(cable.vector)
     length = np.maximum(np.sqrt(dot(r, r)), SHORTEST)
     q = scaled(1.0 / length, r)
@@ -93,7 +93,7 @@ def load_control(
     turning = scaled(1.0 / length, minus(rate, scaled(dot(rate, q), q)))
 
     e, ed, e_vector = _errors(signals, cable, length)
-    integral = np.where(held, np.clip(memory.load_integral + (period * gains.load_k_i) * e_vector, -LIMIT, LIMIT), 0.0)
+    integral = np.where(held, np.clip(state.load_integral + (period * gains.load_k_i) * e_vector, -LIMIT, LIMIT), 0.0)
     square = stiffness(cable)
     k_1, k_2 = swing_gains(gains.load_k_p, gains.load_k_d, square)
     k_q, k_w = gains.load_k_p + square + k_1, gains.load_k_d + k_2
@@ -107,10 +107,10 @@ def load_control(
     along = (gains.vehicle_mass + gains.load_mass) * dot(wanted, q) + inertia * dot(turning, turning)
     turned = plus(scaled(k_q, cross(q, cross(q, aim))), scaled(k_w, turning))
     force = joined(plus(scaled(along, q), scaled(inertia, turned)))
-    return np.where(held, force, alone), LoadMemory(integral, alone_memory)
+    return np.where(held, force, alone), LoadState(integral, alone_memory)
 
 
-def _errors(signals: Signals, cable: Cable, length: Array) -> tuple[Vector, Vector, Array]:
+def _errors(signals: JointInput, cable: Cable, length: Array) -> tuple[Vector, Vector, Array]:
     """Errors of the load (m, m/s), and the first one as an array."""
     load, speed = signals.q + cable.vector, signals.qd + cable.rate
     below = joined((0.0 * length, 0.0 * length, length))

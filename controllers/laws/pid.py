@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from controllers.laws.errors import GainError
 from controllers.laws.tde import TdeGains
-from controllers.laws.tracking import Array, Gain, Signals, check_positive, errors, make_plain, times
+from controllers.laws.tracking import Array, Gain, JointInput, check_positive, errors, make_plain, times
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,7 +35,7 @@ class PidGains:
             check_positive(field.name, getattr(self, field.name))
 
 
-class PidMemory(NamedTuple):
+class PidState(NamedTuple):
     """Velocity of the sample before (..., n)."""
 
     qd: Array
@@ -57,15 +57,15 @@ def identity_gains(gains: TdeGains, period: float) -> PidGains:
     return PidGains(plain(m_bar * k_d / period), plain(m_bar * k_p / period), plain(m_bar / period))
 
 
-def pid_start(signals: Signals, period: float) -> PidMemory:
+def pid_init(signals: JointInput, period: float) -> PidState:
     """Memory before the first sample: as if the reference acceleration had acted; the derivative term is zero."""
-    return PidMemory(signals.qd - period * signals.qdd_ref)
+    return PidState(signals.qd - period * signals.qdd_ref)
 
 
-def pid(gains: PidGains, memory: PidMemory, signals: Signals, period: float) -> tuple[Array, PidMemory]:
+def pid(gains: PidGains, state: PidState, signals: JointInput, period: float) -> tuple[Array, PidState]:
     """One sample of the law at the top."""
     e, ed = errors(signals)
-    slowing = period * signals.qdd_ref - (signals.qd - memory.qd)
+    slowing = period * signals.qdd_ref - (signals.qd - state.qd)
     tau = signals.tau_applied + times(gains.proportional, period * ed) + times(gains.integral, period * e)
     tau = tau + times(gains.derivative, slowing)
-    return tau, PidMemory(signals.qd)
+    return tau, PidState(signals.qd)

@@ -17,7 +17,7 @@ import numpy as np
 from controllers.laws.tracking import (
     Array,
     Gain,
-    Signals,
+    JointInput,
     check_non_negative,
     check_positive,
     desired_acceleration,
@@ -53,23 +53,23 @@ class PositionalPidGains:
         check_non_negative("integral_limit", self.integral_limit)
 
 
-class PositionalPidMemory(NamedTuple):
+class PositionalPidState(NamedTuple):
     """The integral for the next sample (..., n), as an acceleration."""
 
     integral: Array
 
 
-def positional_pid_start(gains: PositionalPidGains, signals: Signals) -> PositionalPidMemory:
+def positional_pid_init(gains: PositionalPidGains, signals: JointInput) -> PositionalPidState:
     """Memory before the first sample: the force that acts is what the reference acceleration takes."""
-    return PositionalPidMemory(signals.tau_applied / np.asarray(gains.m_bar, signals.q.dtype) - signals.qdd_ref)
+    return PositionalPidState(signals.tau_applied / np.asarray(gains.m_bar, signals.q.dtype) - signals.qdd_ref)
 
 
 def positional_pid(
-    gains: PositionalPidGains, memory: PositionalPidMemory, signals: Signals, period: float
-) -> tuple[Array, PositionalPidMemory]:
+    gains: PositionalPidGains, state: PositionalPidState, signals: JointInput, period: float
+) -> tuple[Array, PositionalPidState]:
     """One sample of the law at the top; the integral of sample k acts in sample k, its change from the next one on."""
     e, ed = errors(signals)
-    u = desired_acceleration(signals, e, ed, gains.k_p, gains.k_d) + memory.integral
+    u = desired_acceleration(signals, e, ed, gains.k_p, gains.k_d) + state.integral
     limit = gains.integral_limit
-    integral = np.minimum(np.maximum(memory.integral + (period * gains.k_i) * e, -limit), limit)
-    return times(gains.m_bar, u), PositionalPidMemory(integral)
+    integral = np.minimum(np.maximum(state.integral + (period * gains.k_i) * e, -limit), limit)
+    return times(gains.m_bar, u), PositionalPidState(integral)

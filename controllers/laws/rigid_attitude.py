@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 
 from controllers.laws.computed_torque import ComputedTorqueGains, computed_torque
-from controllers.laws.tracking import Array, Gain, Signals, check_positive, components, times
+from controllers.laws.tracking import Array, Gain, JointInput, check_positive, components, times
 from controllers.laws.vectors import cross, joined
 
 
@@ -26,7 +26,7 @@ class RigidAttitudeGains(ComputedTorqueGains):
         check_positive("inertia", self.inertia)
 
 
-def rigid_attitude(gains: RigidAttitudeGains, signals: Signals) -> Array:
+def rigid_attitude(gains: RigidAttitudeGains, signals: JointInput) -> Array:
     """One sample of the law at the top."""
 
     def inverse_dynamics(_q: Array, qd: Array, qdd: Array) -> Array:

@@ -16,26 +16,26 @@ from controllers.laws.errors import GainError
 from controllers.laws.tracking import Array, check_positive_number, is_finite
 
 
-class FilterMemory(NamedTuple):
+class FilterState(NamedTuple):
     """Output x and its rate x., each (...)."""
 
     value: Array
     rate: Array
 
 
-def second_order(memory: FilterMemory, u: Array, natural: float, damping: float, period: float) -> FilterMemory:
+def second_order(state: FilterState, u: Array, natural: float, damping: float, period: float) -> FilterState:
     """Output and rate one `period` (s) later, under the input `u` (...).
 
     Args:
-        memory: output and rate now.
+        state: output and rate now.
         u: input.
         natural: w (rad/s), above zero.
         damping: zeta, above 0 up to 1.
         period: s.
     """
     (stay, carry), (pull, slow) = _transition(natural, damping, period)
-    gap = memory.value - u
-    return FilterMemory(u + (stay * gap + carry * memory.rate), pull * gap + slow * memory.rate)
+    gap = state.value - u
+    return FilterState(u + (stay * gap + carry * state.rate), pull * gap + slow * state.rate)
 
 
 def check_filter(natural: float, damping: float) -> None:

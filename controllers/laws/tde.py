@@ -23,7 +23,7 @@ from controllers.laws.errors import GainError
 from controllers.laws.tracking import (
     Array,
     Gain,
-    Signals,
+    JointInput,
     check_non_negative,
     check_positive,
     check_positive_number,
@@ -44,7 +44,7 @@ class TdeGains:
 
     Attributes:
         m_bar: constant nominal inertia (kg m^2); a matrix is allowed too. Stable only while the eigenvalues of
-            M(q)^-1 m_bar lie in (0, 2), see `controllers.laws.validity`.
+            M(q)^-1 m_bar lie in (0, 2), see `controllers.laws.stability`.
         k_p: stiffness of the error dynamics (1/s^2).
         k_d: damping of the error dynamics (1/s).
 
@@ -73,7 +73,7 @@ class TdeGains:
         check_positive("k_d", self.k_d)
 
 
-class TdeMemory(NamedTuple):
+class TdeState(NamedTuple):
     """What one sample leaves for the next, each (..., n): qd, u, and sigma for those who look at it."""
 
     qd: Array
@@ -81,27 +81,27 @@ class TdeMemory(NamedTuple):
     sigma: Array
 
 
-def tde_start(signals: Signals, period: float) -> TdeMemory:
+def tde_init(signals: JointInput, period: float) -> TdeState:
     """Memory before the first sample: as if the reference acceleration had acted, so that a_0 = qdd_ref, sigma_0 = 0.
 
     That leaves feedback alone on top of the force that acts.
     """
-    return TdeMemory(signals.qd - period * signals.qdd_ref, signals.qdd_ref, np.zeros_like(signals.qd))
+    return TdeState(signals.qd - period * signals.qdd_ref, signals.qdd_ref, np.zeros_like(signals.qd))
 
 
 def tde(
-    gains: TdeGains, memory: TdeMemory, signals: Signals, period: float, du: Array | None = None
-) -> tuple[Array, TdeMemory]:
+    gains: TdeGains, state: TdeState, signals: JointInput, period: float, du: Array | None = None
+) -> tuple[Array, TdeState]:
     """One sample of the law at the top; `du` (..., n) is whatever is added to the desired acceleration (rad/s^2)."""
     u = desired_acceleration(signals, *errors(signals), gains.k_p, gains.k_d)
-    return time_delay(gains.m_bar, memory, signals, u if du is None else u + du, period)
+    return time_delay(gains.m_bar, state, signals, u if du is None else u + du, period)
 
 
-def time_delay(m_bar: Inertia, memory: TdeMemory, signals: Signals, u: Array, period: float) -> tuple[Array, TdeMemory]:
+def time_delay(m_bar: Inertia, state: TdeState, signals: JointInput, u: Array, period: float) -> tuple[Array, TdeState]:
     """The force that lets the acceleration be `u` (..., n), as far as the dynamics are what they were a sample ago."""
-    a = (signals.qd - memory.qd) / period
+    a = (signals.qd - state.qd) / period
     tau = signals.tau_applied + inertia_times(m_bar, u - a)
-    return tau, TdeMemory(signals.qd, u, memory.u - a)
+    return tau, TdeState(signals.qd, u, state.u - a)
 
 
 def inertia_times(m_bar: Inertia, v: Array) -> Array:
@@ -150,8 +150,8 @@ def equivalent_gains(gains: ConstantGains) -> TdeGains:
 
 
 def constant_gain_tde(
-    gains: ConstantGains, memory: TdeMemory, signals: Signals, period: float, du: Array | None = None
-) -> tuple[Array, TdeMemory]:
+    gains: ConstantGains, state: TdeState, signals: JointInput, period: float, du: Array | None = None
+) -> tuple[Array, TdeState]:
     """TDE with du = alpha c s / sqrt(|s|^2 + eps)."""
     robust = (gains.alpha * gains.c) * smooth_sign(sliding_variable(*errors(signals), gains.k_p, gains.k_d), gains.eps)
-    return tde(gains, memory, signals, period, robust if du is None else robust + du)
+    return tde(gains, state, signals, period, robust if du is None else robust + du)

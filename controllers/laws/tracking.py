@@ -17,7 +17,7 @@ Gain: TypeAlias = "float | Sequence[float]"
 """One number for all joints or one a joint."""
 
 
-class Signals(NamedTuple):
+class JointInput(NamedTuple):
     """One sample of n joints, each (..., n), in rad, rad/s, rad/s^2 and Nm (or m, ..., N).
 
     `tau_applied` is the generalised force that really acted since the sample before.
@@ -31,28 +31,28 @@ class Signals(NamedTuple):
     tau_applied: Array
 
 
-Memory: TypeAlias = "tuple[Any, ...]"
+LawState: TypeAlias = "tuple[Any, ...]"
 """What a law remembers: a named tuple of arrays, or of such tuples."""
 
 
 class Law(NamedTuple):
-    """A law on `Signals` by its functions.
+    """A law on `JointInput` by its functions.
 
     Attributes:
         start: (gains, signals, period) -> memory before the first sample.
         step: (gains, memory, signals, period) -> force (..., n), memory for the next sample.
     """
 
-    start: Callable[[Any, Signals, float], Memory]
-    step: Callable[[Any, Any, Signals, float], tuple[Array, Memory]]
+    start: Callable[[Any, JointInput, float], LawState]
+    step: Callable[[Any, Any, JointInput, float], tuple[Array, LawState]]
 
 
-def errors(signals: Signals) -> tuple[Array, Array]:
+def errors(signals: JointInput) -> tuple[Array, Array]:
     """e = q_ref - q and ed = qd_ref - qd."""
     return signals.q_ref - signals.q, signals.qd_ref - signals.qd
 
 
-def desired_acceleration(signals: Signals, e: Array, ed: Array, k_p: Gain, k_d: Gain) -> Array:
+def desired_acceleration(signals: JointInput, e: Array, ed: Array, k_p: Gain, k_d: Gain) -> Array:
     """u_0 = qdd_ref + Kd ed + Kp e (Dantu 2023, equation 2.5c)."""
     return signals.qdd_ref + times(k_d, ed) + times(k_p, e)
 

@@ -11,25 +11,25 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from controllers.laws.tracking import Array, Signals
+from controllers.laws.tracking import Array, JointInput
 
 
-class EstimateMemory(NamedTuple):
+class EstimateState(NamedTuple):
     """Angle of the sample before and the low-pass, each (..., n)."""
 
     q: Array
     qd: Array
 
 
-def estimate_start(signals: Signals, period: float) -> EstimateMemory:
+def estimate_init(signals: JointInput, period: float) -> EstimateState:
     """Memory before the first sample: as if the robot had moved with the reference."""
-    return EstimateMemory(signals.q - period * signals.qd_ref, signals.qd_ref)
+    return EstimateState(signals.q - period * signals.qd_ref, signals.qd_ref)
 
 
 def estimate(
-    cutoff_hz: float, memory: EstimateMemory, signals: Signals, period: float
-) -> tuple[Signals, EstimateMemory]:
+    cutoff_hz: float, state: EstimateState, signals: JointInput, period: float
+) -> tuple[JointInput, EstimateState]:
     """The signals with the velocity replaced by its estimate."""
     keep = math.exp(-2 * math.pi * cutoff_hz * period)
-    qd = keep * memory.qd + ((1 - keep) / period) * (signals.q - memory.q)
-    return signals._replace(qd=qd), EstimateMemory(signals.q, qd)
+    qd = keep * state.qd + ((1 - keep) / period) * (signals.q - state.q)
+    return signals._replace(qd=qd), EstimateState(signals.q, qd)

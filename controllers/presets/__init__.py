@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from artde_gym.errors import UnknownNameError, among
+from artde_gym.errors import UnknownNameError, suggest_names
 from artde_gym.registration import GainRange
 from controllers.drive import DRIVES, Preset
 from controllers.law_table import GAINS
@@ -36,7 +36,7 @@ def preset_gains(robot: str, law: str, preset: str | None, joints: int, override
         flat = named_gains(gains)
         for name in overrides:
             if name not in flat:
-                raise GainError(f"of {law!r}", name, among(name, flat))
+                raise GainError(f"of {law!r}", name, suggest_names(name, flat))
         gains = _replaced(gains, overrides)
     else:
         gains = _given(robot, law, preset, overrides)
@@ -55,7 +55,7 @@ def gain_ranges(robot: str, law: str, preset: str | None) -> dict[str, GainRange
     gains = named_gains(_preset(robot, law, preset).gains)
     known = DRIVES[robot].ranges
     if law not in known:
-        raise UnknownNameError(f"controller of {robot!r} to be tuned", law, among(law, known))
+        raise UnknownNameError(f"controller of {robot!r} to be tuned", law, suggest_names(law, known))
     return {name: GainRange(gains[name], low, high) for name, (low, high) in known[law].items()}
 
 
@@ -64,11 +64,11 @@ def _given(robot: str, law: str, preset: str | None, gains: dict[str, Any]) -> A
     if preset is not None:
         raise UnknownNameError(f"preset of {law!r} for {robot!r}", preset, "none: the robot has no presets")
     if law not in GAINS:
-        raise UnknownNameError(f"controller of {robot!r}", law, among(law, GAINS))
+        raise UnknownNameError(f"controller of {robot!r}", law, suggest_names(law, GAINS))
     fields = {field.name: field for field in dataclasses.fields(GAINS[law])}
     for name in gains:
         if name not in fields:
-            raise GainError(f"of {law!r}", name, among(name, fields))
+            raise GainError(f"of {law!r}", name, suggest_names(name, fields))
     needed = [name for name, field in fields.items() if field.default is dataclasses.MISSING]
     if missing := [name for name in needed if name not in gains]:
         allowed = f"{', '.join(needed)}, all of them: {robot!r} has no presets, for which its plug-in needs a Drive"
@@ -78,11 +78,11 @@ def _given(robot: str, law: str, preset: str | None, gains: dict[str, Any]) -> A
 
 def _preset(robot: str, law: str, preset: str | None) -> Preset:
     if robot not in DRIVES:
-        raise UnknownNameError("robot with presets", robot, among(robot, DRIVES))
+        raise UnknownNameError("robot with presets", robot, suggest_names(robot, DRIVES))
     known = DRIVES[robot].presets
     laws = list(dict.fromkeys(name for name, _ in known))
     if law not in laws:
-        raise UnknownNameError(f"controller of {robot!r}", law, among(law, laws) if laws else "none yet")
+        raise UnknownNameError(f"controller of {robot!r}", law, suggest_names(law, laws) if laws else "none yet")
     names = [name for own, name in known if own == law]
     if preset is not None and preset not in names:
         raise UnknownNameError(f"preset of {law!r} for {robot!r}", preset, ", ".join(map(repr, names)))

@@ -62,7 +62,7 @@ _CONSTANT = _cascade(
 
 _HAND = "ours, by hand: the first gains that flew, before any evaluation; no source gives some for this vehicle"
 _TUNED = (
-    "ours: `artde-gym tune --scenario Q1 --trials 60 --episodes 8 --held-out 100 --seed 0 --backend batch`, as for "
+    "ours: `artde-gym tune --scenario Q1 --trials 60 --episodes 8 --held-out 100 --seed 0 --vectorized`, as for "
     "every law; best there, and nearer to instability than the default"
 )
 

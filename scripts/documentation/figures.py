@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from artde_gym.arrays import Array
-from artde_gym.palette import looks
+from artde_gym.palette import styles
 from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.html import figure
 from artde_gym.robots.ojas.report import loop as joint_loop
@@ -24,7 +24,7 @@ from controllers.laws.computed_torque import ComputedTorqueGains
 from controllers.laws.positional_pid import PositionalPidGains
 from controllers.laws.rigid_attitude import rigid_attitude
 from controllers.laws.tde import ConstantGains, equivalent_gains
-from controllers.laws.tracking import Signals, components
+from controllers.laws.tracking import JointInput, components
 from controllers.laws.vectors import joined
 from documentation.architecture import rooms
 from documentation.plant import ARM, DURATION, LIFT, LOADED, PUSHED, Plant, Run, modelled, simulate
@@ -52,7 +52,7 @@ def tde() -> str:
         f"{_values(runs)}; {_values(periods)}. Last chart: the inertia varied, with a torque limit that keeps what "
         "diverges finite; from m_bar / M = 2 on the estimate of one sample contradicts that of the next."
     )
-    return figure(caption, charts, looks([*runs, *periods])) + joint_loop()
+    return figure(caption, charts, styles([*runs, *periods])) + joint_loop()
 
 
 def atde() -> str:
@@ -63,7 +63,7 @@ def atde() -> str:
         "sliding variable": over_time("|s| (1)", {"atde": inside(runs["atde"], "s")}),
     }
     caption = f"{_arm()} RMS error {_values(runs)}. The gain moves by gamma_0 L |s| a sample, up while |s| grows."
-    return figure(caption, charts, looks(runs))
+    return figure(caption, charts, styles(runs))
 
 
 def artde() -> str:
@@ -82,7 +82,7 @@ def artde() -> str:
         f"{_arm()} RMS error {_values(runs)}. tde+kd is plain TDE with the stiffness that ARTDE had on average "
         f"(gain {gain:.3f} rad/s^2): what is left between the two is adaptation."
     )
-    return figure(caption, charts, looks(runs))
+    return figure(caption, charts, styles(runs))
 
 
 def constant_gain() -> str:
@@ -93,13 +93,13 @@ def constant_gain() -> str:
     line = constant.alpha * constant.c * s / math.sqrt(constant.eps)
     shape = Chart("Robust term over the sliding variable", Axis.of("s (1)", s), Axis.of("du (rad/s^2)", sign, line))
     for name, values in (("tde+c", sign), ("tde+kd", line)):
-        shape.line(s, values, looks([name])[name], text=name)
+        shape.line(s, values, styles([name])[name], text=name)
     charts = {
         "error": errors(runs),
         "robust term": shape.svg(),
     }
     caption = f"{_arm()} RMS error {_values(runs)}. Right: the robust term of constant gain, and its slope at s = 0."
-    return figure(caption, charts, looks(runs))
+    return figure(caption, charts, styles(runs))
 
 
 def pid() -> str:
@@ -114,7 +114,7 @@ def pid() -> str:
     caption = (
         f"{_arm()} The two errors lie on each other: at most {np.abs(apart).max():.1e} Nm are between the torques."
     )
-    return figure(caption, charts, looks(runs))
+    return figure(caption, charts, styles(runs))
 
 
 def positional_pid() -> str:
@@ -131,7 +131,7 @@ def positional_pid() -> str:
         f"{_lift()} RMS error {_values(runs)}; PID at its tuned gains, TDE at the thesis'. What the integral has to "
         f"learn is the load's weight over the nominal mass, {needed:.2f} m/s^2 (dashed)."
     )
-    return figure(caption, charts, looks(runs))
+    return figure(caption, charts, styles(runs))
 
 
 def asmc() -> str:
@@ -144,7 +144,7 @@ def asmc() -> str:
         "learnt mass over nominal mass": over_time("r (1)", {"asmc": ratio}, level=true),
     }
     caption = f"{_lift()} RMS error {_values(runs)}. Dashed: the true ratio of masses with the load, {true:.3f}."
-    return figure(caption, charts, looks(runs))
+    return figure(caption, charts, styles(runs))
 
 
 def indi() -> str:
@@ -159,7 +159,7 @@ def indi() -> str:
         f"{_lift()} The measured velocity has noise of {100 * NOISE:g} cm/s. RMS error {_values(runs)}, and without "
         f"noise {_values(calm)}; standard deviation of the force's change from sample to sample: {rough}."
     )
-    return figure(caption, charts, looks(runs))
+    return figure(caption, charts, styles(runs))
 
 
 def computed() -> str:
@@ -172,7 +172,7 @@ def computed() -> str:
         f"{_arm()} RMS error before the load: {_listed(before, 'deg')}; with it: {_listed(after, 'deg')}. The model "
         "that is exact without the load does not know it."
     )
-    return figure(caption, charts, looks(runs))
+    return figure(caption, charts, styles(runs))
 
 
 def geometric() -> str:
@@ -190,11 +190,11 @@ def geometric() -> str:
     for k in range(count):
         angles[k] = np.degrees(np.arccos(np.clip((np.trace(rotation, axis1=1, axis2=2) - 1) / 2, -1, 1)))
         e = _attitude_error(rotation)
-        torque = rigid_attitude(gains, Signals(-e, rates, 0 * e, 0 * e, 0 * e, 0 * e))
+        torque = rigid_attitude(gains, JointInput(-e, rates, 0 * e, 0 * e, 0 * e, 0 * e))
         for _ in range(10):
             rates = rates + (period / 10) * (torque - np.cross(rates, inertia * rates)) / inertia
             rotation = rotation @ _turned((period / 10) * rates)
-    shown = looks(names)
+    shown = styles(names)
     fall = Chart("Angle to the desired attitude over time", Axis("time (s)", 0.0, float(time[-1])),
                  Axis("angle (deg)", 0.0, 180.0))  # fmt: skip
     for name, column in zip(names, angles.T, strict=True):
@@ -204,7 +204,7 @@ def geometric() -> str:
     law = Chart(
         "Size of the attitude error over the angle", Axis("angle (deg)", 0.0, 180.0), Axis("|e_q| (rad)", 0.0, 1.1)
     )
-    law.line(np.degrees(sweep), sizes, looks(["geometric"])["geometric"])
+    law.line(np.degrees(sweep), sizes, styles(["geometric"])["geometric"])
     caption = (
         "A rigid body with the quadrotor's inertia and the geometric controller's attitude gains turns back to level "
         "from four tilts about a skew axis. The error is the sine of the angle: it is largest at 90 degrees and "
@@ -256,7 +256,7 @@ def over_time(label: str, columns: Mapping[str, Signal], *, log: bool = False, l
                   Axis.of(label, *values, log=log, zero=not log))  # fmt: skip
     chart.event(LOADED, LOADED, "load")
     chart.event(*PUSHED, "push")
-    for name, look in looks(columns).items():
+    for name, look in styles(columns).items():
         chart.line(*columns[name], look, text=name)
     if level is not None:
         chart.level(level, "")
@@ -264,7 +264,7 @@ def over_time(label: str, columns: Mapping[str, Signal], *, log: bool = False, l
 
 
 def errors(runs: Mapping[str, Run], *, log: bool = False) -> str:
-    """Tracking errors, of an arm in degrees, of a lift in millimetres; their sizes on a logarithmic axis."""
+    """Tracking errors, of an arm in degrees, of a lift in millimeters; their sizes on a logarithmic axis."""
     columns = {}
     for name, run in runs.items():
         e = _scale(run)[0] * run.e[:, 0]
@@ -291,7 +291,7 @@ def _validity() -> str:
         "RMS error over m_bar / M", Axis("m_bar / M (1)", 0.0, 2.5), Axis.of("RMS error (deg)", rms, log=True)
     )
     chart.event(2.0, 2.5, "diverges")
-    chart.line(RATIOS, rms, looks(["tde"])["tde"])
+    chart.line(RATIOS, rms, styles(["tde"])["tde"])
     return chart.svg()
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from artde_gym.arrays import Array
 from controllers.law_table import Nothing
 from controllers.laws.computed_torque import ComputedTorqueGains, computed_torque
-from controllers.laws.tracking import Law, Signals
+from controllers.laws.tracking import JointInput, Law
 from controllers.policies import flatten
 
 DURATION = 6.0  # s
@@ -81,7 +81,7 @@ def simulate(law: Law, gains: Any, plant: Plant, period: float, *, duration: flo
     for t in time.tolist():
         q_ref, qd_ref, qdd_ref = (value * ones for value in _reference(plant, t))
         seen = qd + noise * generator.standard_normal(qd.shape)
-        signals = Signals(q, seen, q_ref, qd_ref, qdd_ref, tau)
+        signals = JointInput(q, seen, q_ref, qd_ref, qdd_ref, tau)
         if memory is None:
             memory = law.start(gains, signals, period)
         tau, memory = law.step(gains, memory, signals, period)
@@ -102,10 +102,10 @@ def simulate(law: Law, gains: Any, plant: Plant, period: float, *, duration: flo
 def modelled(plant: Plant) -> Law:
     """Computed torque with the plant's own equation, but for the load, which it does not know."""
 
-    def start(_gains: Any, _signals: Signals, _period: float) -> Nothing:
+    def start(_gains: Any, _signals: JointInput, _period: float) -> Nothing:
         return Nothing()
 
-    def step(gains: ComputedTorqueGains, memory: Any, signals: Signals, _period: float) -> tuple[Array, Any]:
+    def step(gains: ComputedTorqueGains, memory: Any, signals: JointInput, _period: float) -> tuple[Array, Any]:
         def inverse_dynamics(q: Array, qd: Array, qdd: Array) -> Array:
             return plant.inertia * qdd + plant.damping * qd + _weight(plant, q, 0.0)
 

@@ -10,7 +10,7 @@ import numpy as np
 import artde_gym  # noqa: F401  # registers the environments
 import controllers
 from artde_gym.arrays import Array
-from artde_gym.palette import looks
+from artde_gym.palette import styles
 from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.html import figure
 
@@ -22,7 +22,7 @@ LAWS: dict[str, dict[str, Any]] = {"tde": {"preset": "tuned"}, "tde+swing": {}, 
 def swing() -> str:
     """Swing and load error over time."""
     runs = {name: _flown(name, gains) for name, gains in LAWS.items()}
-    shown = looks(runs)
+    shown = styles(runs)
     charts: dict[str, str] = {}
     for number, label in enumerate(("swing (deg)", "load's error (mm)")):
         values = [run[number] for run in runs.values()]

@@ -6,22 +6,22 @@ import os
 import signal
 import sys
 
-from artde_gym.doctor.outcome import Outcome
+from artde_gym.doctor.check_result import CheckResult
 
 
-def raises() -> list[Outcome]:
+def raises() -> list[CheckResult]:
     raise RuntimeError("a broken package")
 
 
-def dies() -> list[Outcome]:
+def dies() -> list[CheckResult]:
     os.kill(os.getpid(), signal.SIGSEGV)
     return []
 
 
-def exits() -> list[Outcome]:
+def exits() -> list[CheckResult]:
     sys.exit(3)
 
 
-def hangs() -> list[Outcome]:
+def hangs() -> list[CheckResult]:
     signal.pause()
     return []

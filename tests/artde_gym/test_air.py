@@ -20,7 +20,7 @@ INDEX = np.arange(200_000, dtype=np.uint64)
 
 def realised_wind(**parameters: Any) -> dict[str, Any]:
     disturbances = Disturbances.parse({"wind": parameters}, ("body",), (), "q450")
-    return disturbances.draw(np.random.default_rng(0))["wind"]
+    return disturbances.sample(np.random.default_rng(0))["wind"]
 
 
 def blow(places: np.ndarray, key: int = 0, **parameters: Any) -> np.ndarray:
@@ -103,7 +103,7 @@ def test_jet_is_gaussian_across_and_constant_along_its_axis() -> None:
         "ambient": 0.0,
         "turbulence": 0.0,
         "fan_speed": 3.0,
-        "fan_place": [0.1, 0.2, 0.3],
+        "fan_position": [0.1, 0.2, 0.3],
         "fan_direction": direction.tolist(),
         "fan_radius": 0.4,
     }

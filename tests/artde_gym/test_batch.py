@@ -22,20 +22,20 @@ from artde_gym.evaluation.tasks import Update, chunks_of
 TASKS = importlib.import_module("artde_gym.evaluation.tasks")
 QUADROTOR = "QuadInfinity-Payload-v0"
 WINDY: dict[str, Any] = {
-    "payload": {"mass": {"uniform": [0.33, 0.37]}, "position": [0.01, 0.0, -0.1], "drop": 1.0},
+    "payload": {"mass": {"uniform": [0.33, 0.37]}, "position": [0.01, 0.0, -0.1], "detach_time": 1.0},
     "push": [{"body": "body", "magnitude": {"uniform": [0.5, 2.0]}, "start": 0.5}],
     "wind": 1.0,
     "ground_effect": 1.0,
     "initial_position": {"offset": [{"uniform": [-0.005, 0.005]}] * 3},
 }
-FAILING = {"actuator_loss": [{"joint": "front_left", "start": {"uniform": [0.2, 2.0]}}]}
+FAILING = {"actuator_effectiveness": [{"joint": "front_left", "start": {"uniform": [0.2, 2.0]}}]}
 """A rotor stops at some time; some of the vehicles crash before the end."""
 TOLERANCES = {"_m": 5e-4, "_deg": 0.05, "rms_thrust": 0.01, "rms_torque": 1e-3, "recovery_time": 0.02}
 
 
-def fly(backend: Any = "batch", disturbances: Any = WINDY, duration: float = 1.6, **kwargs: Any) -> Result:
+def fly(vectorized: bool = True, disturbances: Any = WINDY, duration: float = 1.6, **kwargs: Any) -> Result:
     kwargs = {"controllers": ["artde"], "episodes": 7, "env_kwargs": {"duration": duration}, **kwargs}
-    return evaluate(kwargs.pop("controllers"), QUADROTOR, backend=backend, disturbances=disturbances, **kwargs)
+    return evaluate(kwargs.pop("controllers"), QUADROTOR, vectorized=vectorized, disturbances=disturbances, **kwargs)
 
 
 def same(one: Result, other: Result) -> None:
@@ -45,7 +45,7 @@ def same(one: Result, other: Result) -> None:
 def test_batch_is_single_within_the_physics() -> None:
     single: Any
     batch: Any
-    single, batch = (fly(backend, episodes=4).episodes for backend in ("single", "batch"))
+    single, batch = (fly(vectorized, episodes=4).episodes for vectorized in (False, True))
     assert set(single) == set(batch)
     drawn = [name for name in single if name.startswith("disturbance.")]
     assert len(drawn) > 15
@@ -69,7 +69,7 @@ def test_batch_is_single_within_the_physics() -> None:
 def test_crashes_are_those_of_single() -> None:
     single: Any
     batch: Any
-    single, batch = (fly(backend, FAILING, controllers=["pid"]).episodes for backend in ("single", "batch"))
+    single, batch = (fly(vectorized, FAILING, controllers=["pid"]).episodes for vectorized in (False, True))
     assert 0 < single["fell"].sum() < 7
     assert single["fell"].tolist() == batch["fell"].tolist()
     assert single["fall_reason"].tolist() == batch["fall_reason"].tolist()
@@ -80,17 +80,17 @@ def test_crashes_are_those_of_single() -> None:
 def test_bipeds_in_batches_are_single_ones_to_the_bit(tmp_path: Path) -> None:
     """Metrics and signals of walks that fall and of walks that do not; in the same engine nothing may differ."""
     ahead = {"magnitude": {"uniform": [1.0, 250.0]}, "start": 0.1, "duration": 0.1}
-    mild: dict[str, Any] = {"payload": {"mass": {"uniform": [0.5, 1.5]}}, "push": [ahead], "mass_error": 1.02}
-    for backend in ("single", "batch"):
+    mild: dict[str, Any] = {"payload": {"mass": {"uniform": [0.5, 1.5]}}, "push": [ahead], "mass_scale": 1.02}
+    for vectorized in (False, True):
         evaluate(
             ["tde", "artde"],
             "BipedPush-v0",
             episodes=5,
             disturbances=mild,
             env_kwargs={"engine": "mujoco", "duration": 1.2, "control_period": 0.002},
-            out=tmp_path / backend,
-            traced=2,
-            backend=backend,  # pyright: ignore[reportArgumentType]
+            out=tmp_path / vectorized,
+            record_episodes=2,
+            vectorized=vectorized,  # pyright: ignore[reportArgumentType]
         )
     single, batch = tmp_path / "single", tmp_path / "batch"
     assert (single / "episodes.csv").read_bytes() == (batch / "episodes.csv").read_bytes()
@@ -143,13 +143,13 @@ def test_interruption_and_continuation(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_traces_of_the_first_episodes_on_request(tmp_path: Path) -> None:
-    fly("single", out=tmp_path / "single", traced=1, episodes=2, duration=0.9)
-    fly("batch", out=tmp_path / "batch", traced=2, episodes=3, duration=0.9)
+    fly(False, out=tmp_path / "single", record_episodes=1, episodes=2, duration=0.9)
+    fly(True, out=tmp_path / "batch", record_episodes=2, episodes=3, duration=0.9)
     folder = tmp_path / "batch" / "traces" / "custom"
     assert sorted(path.name for path in folder.iterdir()) == ["artde-0.npz", "artde-1.npz"]
     assert [path.name for path in (tmp_path / "single" / "traces" / "custom").iterdir()] == ["artde-0.npz"]
     single, batch = (
-        np.load(tmp_path / backend / "traces" / "custom" / "artde-0.npz") for backend in ("single", "batch")
+        np.load(tmp_path / vectorized / "traces" / "custom" / "artde-0.npz") for vectorized in (False, True)
     )
     assert set(single) == set(batch)
     for name in single:
@@ -160,7 +160,7 @@ def test_traces_of_the_first_episodes_on_request(tmp_path: Path) -> None:
 
 
 def test_traces_end_with_the_crash(tmp_path: Path) -> None:
-    result = fly(disturbances=FAILING, controllers=["pid"], out=tmp_path, traced=7, trace_hz=20.0)
+    result = fly(disturbances=FAILING, controllers=["pid"], out=tmp_path, record_episodes=7, record_hz=20.0)
     for episode, time in zip(result.episodes["episode"], result.episodes["duration_s"], strict=True):
         traces = np.load(tmp_path / "traces" / "custom" / f"pid-{episode}.npz")
         assert time - 0.045 < traces["time"][-1] <= time + 1e-9
@@ -191,8 +191,8 @@ def test_chunks_cover_all_evenly() -> None:
     [
         ({"env_id": "BipedPush-v0", "env_kwargs": {"engine": "bullet"}}, OptionError, ["engine", "bullet", "'mujoco'"]),
         ({"env_id": "BipedPush-v0", "env_kwargs": {"threads": 0}}, OptionError, ["threads", "0", ">= 1"]),
-        ({"backend": "bach"}, OptionError, ["backend", "bach", "did you mean 'batch'"]),
-        ({"traced": -1}, OptionError, ["traced", "-1"]),
+        ({"vectorized": "bach"}, OptionError, ["vectorized", "bach", "did you mean 'batch'"]),
+        ({"record_episodes": -1}, OptionError, ["record_episodes", "-1"]),
         ({"env_kwargs": {"engine": "bullet"}}, OptionError, ["engine", "bullet", "numpy"]),
         ({"env_kwargs": {"num_envs": 3}}, OptionError, ["num_envs", "duration"]),
         ({"env_kwargs": {"dtype": "float16"}}, OptionError, ["dtype", "float16"]),
@@ -202,7 +202,7 @@ def test_chunks_cover_all_evenly() -> None:
 def test_bad_arguments_are_refused_before_the_first_episode(
     arguments: dict[str, Any], error: type[Exception], words: list[str], tmp_path: Path
 ) -> None:
-    given = {"env_id": QUADROTOR, "backend": "batch", "out": tmp_path / "run", **arguments}
+    given = {"env_id": QUADROTOR, "vectorized": True, "out": tmp_path / "run", **arguments}
     with pytest.raises(error) as caught:
         evaluate(["artde"], episodes=1, **given)
     for word in words:
@@ -214,12 +214,12 @@ def test_an_environment_without_a_vector_is_refused(monkeypatch: pytest.MonkeyPa
     alone = EnvSpec("Alone-v0", entry_point="artde_gym.envs.biped_walk:BipedWalkPayloadEnv")
     monkeypatch.setitem(gym.registry, "Alone-v0", alone)
     with pytest.raises(OptionError, match=rf"batch backend.*Alone-v0.*BipedPush-v0.*{QUADROTOR}"):
-        evaluate(["tde"], "Alone-v0", episodes=1, backend="batch")
+        evaluate(["tde"], "Alone-v0", episodes=1, vectorized=True)
 
 
-@pytest.mark.parametrize(("backend", "scenarios"), [("single", ["Q1", "Q1-calm", "Q1-gale"]), ("batch", ["Q1"])])
-def test_command_prints_table_31_beside_ours(backend: str, scenarios: list[str], tmp_path: Path) -> None:
-    arguments = ["evaluate", "--env", QUADROTOR, "--controllers", "tde,atde,artde,asmc", "--backend", backend]
+@pytest.mark.parametrize(("vectorized", "scenarios"), [("single", ["Q1", "Q1-calm", "Q1-gale"]), ("batch", ["Q1"])])
+def test_command_prints_table_31_beside_ours(vectorized: str, scenarios: list[str], tmp_path: Path) -> None:
+    arguments = ["evaluate", "--env", QUADROTOR, "--controllers", "tde,atde,artde,asmc", "--vectorized", vectorized]
     arguments += ["--episodes", "2", "--workers", "1", "--out", str(tmp_path / "run")]
     outcome = CliRunner().invoke(app, [*arguments, "--env-kwargs", json.dumps({"duration": 0.6})])
     assert outcome.exit_code == 0, outcome.output
@@ -227,7 +227,7 @@ def test_command_prints_table_31_beside_ours(backend: str, scenarios: list[str],
         assert word in outcome.output
     assert outcome.output.count("Table 3.1") == len(set(scenarios) - {"Q1-calm"})  # there was a fan in the thesis
     folder = tmp_path / "run"
-    assert json.loads((folder / "summary.json").read_text())["configuration"]["backend"] == backend
+    assert json.loads((folder / "summary.json").read_text())["configuration"]["vectorized"] == vectorized
     table = pd.read_csv(folder / "episodes.csv")
     assert table["scenario"].unique().tolist() == scenarios
     assert len(table) == 2 * 4 * len(scenarios)

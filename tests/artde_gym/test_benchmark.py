@@ -16,7 +16,7 @@ from artde_gym.benchmark.page import page, written
 from artde_gym.benchmark.timing import in_turns
 from artde_gym.cli import app
 from artde_gym.errors import UnknownNameError
-from artde_gym.sim.bare import body_loop, joint_loop
+from artde_gym.sim.engine_loops import body_loop, joint_loop
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -30,13 +30,13 @@ def test_the_bare_loops_do_what_the_environments_do(engine: str) -> None:
         torque = np.full(12, 0.5)
         env.step(torque)
         advance(torque)
-    assert env._engine.read().q.tobytes() == bare._engine.read().q.tobytes()
+    assert env._engine.state().q.tobytes() == bare._engine.state().q.tobytes()
     vehicle = quadrotor(engine=engine, disturbances={})
     vehicle.reset(seed=0)
     fly = body_loop(vehicle._engine, 15)
     for _ in range(10):
         fly(np.array([1.48 * (9.81 + 2.0), 0.0, 0.0, 0.0]))
-    assert vehicle._engine.read().position[2] - 0.6 == pytest.approx(0.5 * 2.0 * 0.15**2, rel=0.02)
+    assert vehicle._engine.state().position[2] - 0.6 == pytest.approx(0.5 * 2.0 * 0.15**2, rel=0.02)
 
 
 @pytest.mark.bullet

@@ -21,14 +21,14 @@ ALL_AROUND = [{"normal": [0.0, 1.0]}, {"normal": [0.0, 1.0]}, 0.0]
 PUSHED: dict[str, Any] = {
     "payload": {"mass": {"uniform": [0.5, 1.5]}},
     "friction": {"uniform": [0.7, 0.9]},
-    "mass_error": {"uniform": [0.95, 1.05]},
+    "mass_scale": {"uniform": [0.95, 1.05]},
     "push": [{"body": "chest", "magnitude": {"uniform": [5, 30]}, "direction": ALL_AROUND, "start": 0.03}],
 }
 VARIED: dict[str, Any] = {
     "payload": {
         "mass": {"uniform": [0.3, 1.5]},
-        "attach": {"choice": [0.0, 0.02]},
-        "drop": {"choice": [0.01, 0.05, 1e9]},
+        "attach_time": {"choice": [0.0, 0.02]},
+        "detach_time": {"choice": [0.01, 0.05, 1e9]},
     },
     "push": [
         {"body": "chest", "magnitude": {"uniform": [5, 40]}, "start": {"uniform": [0.0, 0.05]}, "duration": 0.02},
@@ -39,10 +39,10 @@ VARIED: dict[str, Any] = {
     "slope": {"pitch_deg": {"uniform": [-1, 1]}, "roll_deg": {"uniform": [-1, 1]}},
     "sensor_noise": {"position": {"choice": [0.0, 1e-5]}, "tilt": 1e-3},
     "encoder_bits": {"choice": [16, 20]},
-    "torque_delay": {"choice": [0, 1]},
+    "action_delay": {"choice": [0, 1]},
     "motor_lag": {"choice": [0.0, 0.002]},
-    "actuator_loss": [{"joint": "left_knee", "factor": 0.9, "start": {"uniform": [0.0, 0.1]}}],
-    "mass_error": {"uniform": [0.9, 1.1]},
+    "actuator_effectiveness": [{"joint": "left_knee", "factor": 0.9, "start": {"uniform": [0.0, 0.1]}}],
+    "mass_scale": {"uniform": [0.9, 1.1]},
     "initial_pose": [{"joint": "all", "offset": {"normal": [0.0, 0.002]}}],
 }
 

@@ -175,7 +175,7 @@ def _triples(values: list[Any]) -> list[tuple[Any, Any, Any]]:
 
 def slung(engine_name: EngineName, time_step: float = 0.001) -> Sling:
     engine = Sling(make_engine(engine_name, q450(), time_step))
-    engine.place((0.0, 0.0, 2.0), np.zeros(0))
+    engine.reset((0.0, 0.0, 2.0), np.zeros(0))
     return engine
 
 
@@ -188,14 +188,14 @@ def test_every_engine_swings_as_bodies_in_numpy_do(engine_name: EngineName) -> N
     lift = (MASS + LOAD) * GRAVITY
     for step in range(600):
         push = (1.0, 0.5, 0.0) if step < 100 else CENTER
-        state = engine.read()
+        state = engine.state()
         up = law.times(law_rot(state), (0.0, 0.0, lift))
-        engine.load_base(up, (0.0, 0.001, 0.0))
-        engine.push("payload", push)
-        engine.push("front_left", (0.0, 0.0, 0.02))
+        engine.apply_world_wrench(up, (0.0, 0.001, 0.0))
+        engine.apply_force("payload", push)
+        engine.apply_force("front_left", (0.0, 0.0, 0.02))
         engine.step(np.zeros(0))
         pendulum_step(pendulum, lift, push)
-    state = engine.read()
+    state = engine.state()
     np.testing.assert_allclose(state.position, pendulum.bodies.com[:, 0], atol=5e-4)
     np.testing.assert_allclose(engine.payload_position() or (), pendulum.cables.position[:, 0], atol=5e-4)
     r, _ = engine.cable(state)
@@ -226,13 +226,13 @@ def test_a_copy_of_a_slung_world_goes_on_as_it_would(engine_name: EngineName) ->
     engine = slung(engine_name)
     engine.hang_payload(LOAD, HOOK, LENGTH)
     for _ in range(20):
-        engine.push("payload", (3.0, 0.0, 0.0))
+        engine.apply_force("payload", (3.0, 0.0, 0.0))
         engine.step(np.zeros(0))
     other = copy.deepcopy(engine)
     for one in (engine, other):
         for _ in range(20):
             one.step(np.zeros(0))
-    assert engine.read().position == other.read().position
+    assert engine.state().position == other.read().position
     assert engine.payload_position() == other.payload_position()
     assert engine.payload_position() is not None
 
@@ -249,21 +249,21 @@ def test_a_push_of_a_fixed_payload_is_one_where_it_is(engine_name: EngineName) -
         engine = slung(engine_name)
         engine.attach_payload(1e-3, place)
         for _ in range(50):
-            engine.push(site, (0.1, 0.0, 0.2))
+            engine.apply_force(site, (0.1, 0.0, 0.2))
             engine.step(np.zeros(0))
-        found.append(engine.read())
+        found.append(engine.state())
     np.testing.assert_allclose(found[0].angular_velocity, found[1].angular_velocity, rtol=2e-2, atol=1e-3)
     engine.release_payload()
-    before = engine.read()
-    engine.push("payload", (100.0, 0.0, 0.0))  # there is none
+    before = engine.state()
+    engine.apply_force("payload", (100.0, 0.0, 0.0))  # there is none
     engine.step(np.zeros(0))
-    assert engine.read().velocity[0] == pytest.approx(before.velocity[0], abs=1e-6)
+    assert engine.state().velocity[0] == pytest.approx(before.velocity[0], abs=1e-6)
 
 
 # --------------------------------------------------------------------------------------------------------- environments
 
 SLUNG: dict[str, Any] = {
-    "payload": {"mass": 0.35, "cable": 0.5, "drop": 2.2},
+    "payload": {"mass": 0.35, "cable": 0.5, "detach_time": 2.2},
     "push": {"body": "payload", "magnitude": 1.4, "direction": [1, 1, 0], "start": 0.5},
     "wind": 1.0,
 }
@@ -286,7 +286,7 @@ def test_engines_agree_in_closed_loop(engine_name: EngineName) -> None:
     alone = closed_loop(gym.make(ID, engine=engine_name, **kwargs), 3.0)
     many = closed_loop(gym.make_vec(ID, 1, "vector_entry_point", engine="numpy", **kwargs), 3.0)
     assert np.abs(alone - many).max() < 1e-3
-    bare = {**SLUNG, "payload": {"mass": 0.35, "drop": 2.2, "position": HOOK}}
+    bare = {**SLUNG, "payload": {"mass": 0.35, "detach_time": 2.2, "position": HOOK}}
     fixed = closed_loop(gym.make(ID, engine=engine_name, disturbances=bare, duration=4.0), 3.0)
     assert np.abs(alone - fixed).max() > 5e-3
 
@@ -296,8 +296,8 @@ VARIED: dict[str, Any] = {
         "mass": {"uniform": [0.05, 0.5]},
         "cable": {"choice": [0.0, 0.3, 1.0, 2.0]},
         "position": {"choice": [[0.0, 0.0, -0.05], [0.02, -0.01, -0.08]]},
-        "drop": {"uniform": [0.2, 0.9]},
-        "attach": {"choice": [0.0, 0.1]},
+        "detach_time": {"uniform": [0.2, 0.9]},
+        "attach_time": {"choice": [0.0, 0.1]},
     },
     "push": [
         {
@@ -309,7 +309,7 @@ VARIED: dict[str, Any] = {
         {"body": "front_left", "magnitude": 1.0, "start": 0.1},
     ],
     "wind": {"choice": [0.0, 3.0]},
-    "mass_error": {"uniform": [0.9, 1.1]},
+    "mass_scale": {"uniform": [0.9, 1.1]},
 }
 
 
@@ -375,8 +375,8 @@ WILD: dict[str, Any] = {
         "mass": {"uniform": [0.001, 5.0]},
         "cable": {"uniform": [0.0, 2.0]},
         "position": [{"uniform": [-0.5, 0.5]}] * 3,
-        "attach": {"uniform": [0.0, 0.6]},
-        "drop": {"uniform": [0.0, 1.2]},
+        "attach_time": {"uniform": [0.0, 0.6]},
+        "detach_time": {"uniform": [0.0, 1.2]},
     },
     "push": [
         {
@@ -389,7 +389,7 @@ WILD: dict[str, Any] = {
         {"body": "front_left", "magnitude": {"uniform": [0.0, 50.0]}, "start": {"uniform": [0.0, 1.0]}},
     ],
     "wind": {"scale": {"uniform": [0.0, 10.0]}},
-    "mass_error": {"uniform": [0.5, 2.0]},
+    "mass_scale": {"uniform": [0.5, 2.0]},
 }
 
 

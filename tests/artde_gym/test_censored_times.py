@@ -112,7 +112,7 @@ def test_falls_that_never_come_are_the_longest_times() -> None:
 def test_console_shows_share_and_median() -> None:
     console = Console(record=True, width=120)
     frame = table({"pid": [1.0, 2.0] + [NEVER] * 17 + [UNKNOWN], "tde": [1.0] * 20})
-    tracking = biped_task.TRACKING
+    tracking = biped_task.METRICS_SPEC
     names = [
         f"{metric}_{t.unit}_{axis}" for metric in ("rmse", "max_abs_error") for t in tracking.errors for axis in t.axes
     ]
@@ -128,7 +128,7 @@ def test_a_fall_after_a_push_is_never() -> None:
     layout = biped_task.OBSERVATION
     for count, expected in ((90, NEVER), (120, NEVER), (40, UNKNOWN)):  # settled, but it falls: in the push, or later
         fields = {field.name: np.zeros((count, 1, field.size)) for field in layout.fields}
-        metrics = Metrics(biped_task.TRACKING, layout, 0.01, [9.0], [{"push0": (0.5, 1.0)}])
+        metrics = Metrics(biped_task.METRICS_SPEC, layout, 0.01, [9.0], [{"push0": (0.5, 1.0)}])
         metrics.add(0, fields, None)
         found = metrics.rows(np.array([True]))[0]["recovery_time_s_push0"]
         np.testing.assert_equal(found, expected)
@@ -177,11 +177,11 @@ def test_a_claim_over_two_scenarios_pairs_by_seed() -> None:
 @pytest.mark.parametrize(
     ("payload", "extra"),
     [
-        ({"attach": 0.0, "drop": 2.0**62}, 2.0),
-        ({"attach": 0.5, "drop": 2.0**62}, 1.0),
-        ({"attach": 0.0, "drop": 0.25}, 0.5),
-        ({"attach": 0.6, "drop": 0.4}, 0.0),
-        ({"attach": 5.0, "drop": 9.0}, 0.0),
+        ({"attach_time": 0.0, "detach_time": 2.0**62}, 2.0),
+        ({"attach_time": 0.5, "detach_time": 2.0**62}, 1.0),
+        ({"attach_time": 0.0, "detach_time": 0.25}, 0.5),
+        ({"attach_time": 0.6, "detach_time": 0.4}, 0.0),
+        ({"attach_time": 5.0, "detach_time": 9.0}, 0.0),
     ],
 )
 def test_cost_of_transport_weighs_what_is_there(payload: dict[str, float], extra: float) -> None:
@@ -191,7 +191,7 @@ def test_cost_of_transport_weighs_what_is_there(payload: dict[str, float], extra
     fields["base_velocity"][..., 0] = 0.5
     fields["tau_applied"][..., 0], fields["qd"][..., 0] = 3.0, 1.0
     load = payload_of({"payload": {"mass": 2.0, **payload}})
-    metrics = Metrics(biped_task.TRACKING, layout, 0.001, [9.0], [{}], payloads=[load])
+    metrics = Metrics(biped_task.METRICS_SPEC, layout, 0.001, [9.0], [{}], payloads=[load])
     metrics.add(0, fields, None)
     row = metrics.rows()[0]
     assert row["cost_of_transport"] == pytest.approx(row["energy_j"] / (GRAVITY * (9.0 + extra) * 0.5))
@@ -211,10 +211,10 @@ def test_cost_of_transport_knows_what_was_drawn() -> None:
         return metrics.rows()[0]["cost_of_transport"]
 
     mass = env.nominal_robot.mass
-    assert cost(payload={"mass": 4.0, "attach": 1.0, "drop": 0.5}) == cost()
+    assert cost(payload={"mass": 4.0, "attach_time": 1.0, "detach_time": 0.5}) == cost()
     assert cost(payload=1.3) == pytest.approx(cost() * mass / (mass + 1.3))
-    assert cost(mass_error=1.1) == pytest.approx(cost() / 1.1)
-    assert cost(mass_error=1.1, payload=1.3) == pytest.approx(cost() * mass / (1.1 * mass + 1.3))
+    assert cost(mass_scale=1.1) == pytest.approx(cost() / 1.1)
+    assert cost(mass_scale=1.1, payload=1.3) == pytest.approx(cost() * mass / (1.1 * mass + 1.3))
 
 
 # ---------------------------------------------------------------- print

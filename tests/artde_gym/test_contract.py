@@ -19,7 +19,7 @@ from artde_gym.sim.factory import resolve_engine
 BRIEF: dict[str, Any] = {
     "payload": 0.3,
     "push": [{"magnitude": 1.0, "start": 0.0, "duration": 0.001}, {"magnitude": 2.0, "start": 0.0, "duration": 0.03}],
-    "actuator_loss": [{"joint": "all", "factor": {"uniform": [0.9, 1.0]}}],
+    "actuator_effectiveness": [{"joint": "all", "factor": {"uniform": [0.9, 1.0]}}],
 }
 KINDS = [(name, vector) for name in ours() for vector in (False, True)]
 
@@ -176,7 +176,7 @@ def test_what_can_never_happen_is_warned_of(name: str) -> None:
         with pytest.warns(UserWarning, match=r"push can never happen: begins at 1 s .* ends at 0\.12 s"):
             env = make(name, vector=vector, disturbances=late)
         with pytest.warns(UserWarning, match="payload can never happen"):
-            env.reset(options={"disturbances": {"payload": {"mass": 0.1, "attach": 0.1, "drop": 0.05}}})
+            env.reset(options={"disturbances": {"payload": {"mass": 0.1, "attach_time": 0.1, "detach_time": 0.05}}})
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             make(name, vector=vector, disturbances={"push": [*late["push"], BRIEF["push"][0]]})

@@ -13,7 +13,7 @@ import artde_gym  # noqa: F401  # registers the environments
 from artde_gym.sim.factory import EngineName
 
 BIPED: dict[str, Any] = {
-    "payload": {"mass": 1.0, "attach": 0.004, "drop": 0.03},
+    "payload": {"mass": 1.0, "attach_time": 0.004, "detach_time": 0.03},
     "push": [{"magnitude": {"uniform": [5, 20]}, "start": 0.01, "duration": 0.02}],
     "grf_pulse": 20.0,
     "rotor_inertia": {"uniform": [0.03, 0.06]},
@@ -22,22 +22,22 @@ BIPED: dict[str, Any] = {
     "torque_limit": 30.0,
     "friction": {"uniform": [0.6, 0.9]},
     "slope": 1.0,
-    "mass_error": {"uniform": [0.9, 1.1]},
+    "mass_scale": {"uniform": [0.9, 1.1]},
     "sensor_noise": {"position": 1e-4, "velocity": 1e-3},
     "encoder_bits": 14,
-    "torque_delay": 2,
+    "action_delay": 2,
     "motor_lag": 0.003,
-    "actuator_loss": [{"joint": "all", "factor": 0.9, "start": 0.02}],
+    "actuator_effectiveness": [{"joint": "all", "factor": 0.9, "start": 0.02}],
 }
 QUADROTOR: dict[str, Any] = {
-    "payload": {"mass": {"uniform": [0.2, 0.3]}, "attach": 0.03, "drop": 0.2},
+    "payload": {"mass": {"uniform": [0.2, 0.3]}, "attach_time": 0.03, "detach_time": 0.2},
     "push": [{"magnitude": {"uniform": [1, 3]}, "start": 0.05, "duration": 0.053}],
     "wind": {"steady": [2.0, 0.0, 0.0]},
     "ground_effect": 1.0,
     "sensor_noise": {"position": 1e-3},
-    "torque_delay": 1,
+    "action_delay": 1,
     "motor_lag": 0.05,
-    "actuator_loss": [{"joint": "all", "factor": 0.95, "start": 0.1}],
+    "actuator_effectiveness": [{"joint": "all", "factor": 0.95, "start": 0.1}],
 }
 CASES: dict[str, dict[str, Any]] = {
     "BipedPush-v0": {"disturbances": BIPED, "duration": 0.1},

@@ -37,14 +37,14 @@ def evaluated(folder: Path) -> Any:
 def searched(folder: Path) -> Any:
     return frontier(
         ["tde"], "QuadInfinity-Payload-v0", "wind.scale", low=0, high=1, tolerance=1, episodes=1, env_kwargs=FLIGHT,
-        disturbances={"wind": 1.0}, out=folder, backend="batch",
+        disturbances={"wind": 1.0}, out=folder, vectorized=True,
     )  # fmt: skip
 
 
 def tuned(folder: Path) -> Any:
     return tune(
         ["tde"], "QuadInfinity-Payload-v0", trials=2, episodes=1, held_out=1, env_kwargs=FLIGHT, out=folder,
-        backend="batch",
+        vectorized=True,
     )  # fmt: skip
 
 

@@ -18,7 +18,7 @@ CASES: dict[str, dict[str, Any]] = {
     "biped in bullet": {"scenario": "S2-L4", "env_kwargs": {"duration": 0.4, "actuator_inertia": "lumped"}},
     "biped in mujoco": {"scenario": "S2-L4", "env_kwargs": {"duration": 0.4, "engine": "mujoco"}},
     "quadrotor in bullet": {"scenario": "Q1-gale", "env_kwargs": {"duration": 0.9}},
-    "quadrotors in batch": {"scenario": "Q1-gale", "env_kwargs": {"duration": 0.9}, "backend": "batch"},
+    "quadrotors in batch": {"scenario": "Q1-gale", "env_kwargs": {"duration": 0.9}, "vectorized": True},
 }
 
 
@@ -31,7 +31,7 @@ def table_of_a_command(folder: Path, case: dict[str, Any]) -> bytes:
     """In a process of its own, with other hashes and other numbers of threads."""
     command = [sys.executable, "-m", "artde_gym.cli", "evaluate", "--controllers", "tde,artde", "--episodes", "2"]
     command += ["--seed", "5", "--workers", "1", "--scenario", case["scenario"], "--out", str(folder)]
-    command += ["--env-kwargs", json.dumps(case["env_kwargs"]), "--backend", case.get("backend", "single")]
+    command += ["--env-kwargs", json.dumps(case["env_kwargs"]), "--vectorized", case.get("vectorized", "single")]
     changed = {"PYTHONHASHSEED": "4242", "OMP_NUM_THREADS": "3", "OPENBLAS_NUM_THREADS": "3"}
     subprocess.run(command, env={**os.environ, **changed}, check=True, capture_output=True)
     return (folder / "episodes.csv").read_bytes()

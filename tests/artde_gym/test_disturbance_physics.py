@@ -75,7 +75,7 @@ def run(env: Any, steps: int, seed: int = 0, actions: np.ndarray | None = None, 
     """The first `steps` periods under TDE, or under given `actions`."""
     policy, state = controllers.make("tde", env), None
     observation, info = env.reset(seed=seed, options=options or None)
-    observations, states, infos, used = [observation], [env._engine.read()], [info], []
+    observations, states, infos, used = [observation], [env._engine.state()], [info], []
     for k in range(steps):
         if actions is None:
             action, state = policy.predict(observation, state)
@@ -85,7 +85,7 @@ def run(env: Any, steps: int, seed: int = 0, actions: np.ndarray | None = None, 
         assert not terminated, info
         used.append(action)
         observations.append(observation)
-        states.append(env._engine.read())
+        states.append(env._engine.state())
         infos.append(info)
     return Run(env.observation_layout.split(np.array(observations)), states, infos, np.array(used))
 
@@ -98,7 +98,7 @@ class Recorder:
         self.pushes: dict[int, list[tuple[str, np.ndarray]]] = {}
         self.torques: list[np.ndarray] = []
         self.loads: list[tuple[float, ...]] = []  # after each step
-        push, lift, step, loads = engine.push, engine.lift_feet, engine.step, engine.foot_loads
+        push, lift, step, loads = engine.apply_force, engine.lift_feet, engine.step, engine.foot_loads
 
         def note_push(site: str, force: POINT) -> None:
             self.pushes.setdefault(len(self.torques), []).append((site, np.array(force)))
@@ -137,7 +137,7 @@ def rotation(quat_xyzw: tuple[float, float, float, float]) -> np.ndarray:
 
 def bullet() -> Any:
     """PyBullet, where the engine under test has it."""
-    from artde_gym.sim.quiet import bullet
+    from artde_gym.sim.pybullet_module import bullet
 
     return bullet
 
@@ -158,7 +158,7 @@ class Mechanics:
 
     def momentum(self) -> np.ndarray:
         """[linear; angular about the world's origin], (6,)."""
-        state, (q, qd) = self.engine.read(), self.joints()
+        state, (q, qd) = self.engine.state(), self.joints()
         matrix = self.tree.mass_matrix(q, rotation(state.quat_xyzw))
         generalised = matrix[:6] @ np.concatenate([state.velocity, state.angular_velocity, qd])
         return np.concatenate([generalised[:3], generalised[3:] + np.cross(state.position, generalised[:3])])
@@ -166,7 +166,7 @@ class Mechanics:
     def site(self, name: str) -> np.ndarray:
         """World position of a site."""
         link, offset = next((link, offset) for site, link, offset in self.engine.spec.sites if site == name)
-        state, (q, _) = self.engine.read(), self.joints()
+        state, (q, _) = self.engine.state(), self.joints()
         frames = self.tree.frames(q, rotation(state.quat_xyzw))
         body = self.tree._body(link)
         return np.asarray(state.position) + frames.origin[body] + frames.rot[body] @ np.asarray(offset)
@@ -188,12 +188,12 @@ def flying(engine_name: EngineName, spec: RobotSpec, gravity: float = 0.0) -> En
     q = np.zeros(12)
     q[[2, 3, 4, 8, 9, 10]] = [-0.4, 0.8, -0.4, -0.2, 0.4, -0.2]
     engine.set_gravity((0.0, 0.0, -gravity))
-    engine.place((0.3, -0.2, 5.0), q)
+    engine.reset((0.3, -0.2, 5.0), q)
     return engine
 
 
 def realise(disturbances: dict[str, Any], **words: Any) -> dict[str, Any]:
-    return Disturbances.parse(disturbances, words.get("sites", ()), ojas().actuated).draw(np.random.default_rng(0))
+    return Disturbances.parse(disturbances, words.get("sites", ()), ojas().actuated).sample(np.random.default_rng(0))
 
 
 # ---------------------------------------------------------------------------------------------------------------- push
@@ -215,7 +215,7 @@ def test_a_push_adds_its_impulse_to_the_momentum(
     before = mechanics.momentum()
     for _ in range(50):
         impulse += DT * np.concatenate([force, np.cross(mechanics.site(site), force)])
-        engine.push(site, (0.3, -0.2, 0.1))
+        engine.apply_force(site, (0.3, -0.2, 0.1))
         engine.step(np.zeros(12))
     change = mechanics.momentum() - before
     np.testing.assert_allclose(change[:3], impulse[:3], rtol=0, atol=float(1e-3 * np.linalg.norm(impulse[:3])))
@@ -244,7 +244,7 @@ def test_the_arm_push_moves_the_real_arm(engine_name: EngineName) -> None:
         # halfway down the upper arm, and in the same place whether the arm is a link of its own or not
         np.testing.assert_allclose(mechanics.site("left_arm"), [0.3, -0.2 + 0.125, 5.0 + 0.26 - 0.06], atol=1e-9)
         np.testing.assert_allclose(mechanics.site(site), fixed.site(site), atol=1e-9)
-        mechanics.engine.push(site, (40.0, 0.0, 0.0))
+        mechanics.engine.apply_force(site, (40.0, 0.0, 0.0))
         mechanics.engine.step(np.zeros(12))
         arm = mechanics.tree.joints.index("left_shoulder_pitch")
         turned[site] = mechanics.joints()[1][arm]
@@ -322,7 +322,7 @@ def test_a_payload_off_centre_moves_the_centre_of_pressure(engine_name: EngineNa
 
 
 def test_a_payload_comes_and_goes(engine_name: EngineName) -> None:
-    env = make({"payload": {"mass": 2.0, "attach": 0.6, "drop": 1.2}}, engine=engine_name)
+    env = make({"payload": {"mass": 2.0, "attach_time": 0.6, "detach_time": 1.2}}, engine=engine_name)
     episode = run(env, 499)
     time = np.array([info["time_s"] for info in episode.infos])
     for begin, end, weight in [(0.2, 0.6, WEIGHT), (0.9, 1.2, WEIGHT + 2.0 * G), (1.5, 2.0, WEIGHT)]:
@@ -333,7 +333,7 @@ def test_a_payload_comes_and_goes(engine_name: EngineName) -> None:
 
 
 def test_the_dropped_ball_falls_freely(engine_name: EngineName) -> None:
-    env = make({"payload": {"mass": 2.0, "position": [0.0, 0.0, 0.2], "drop": 0.1}}, engine=engine_name)
+    env = make({"payload": {"mass": 2.0, "position": [0.0, 0.0, 0.2], "detach_time": 0.1}}, engine=engine_name)
     env.reset(seed=0)
     engine, heights = env._engine, []
     for _ in range(100):
@@ -351,9 +351,9 @@ def test_attaching_a_payload_makes_no_jump(engine_name: EngineName) -> None:
     engine = flying(engine_name, ojas("lumped"))
     mechanics = Mechanics(engine)
     for _ in range(50):
-        engine.push("chest", (60.0, 30.0, 0.0))
+        engine.apply_force("chest", (60.0, 30.0, 0.0))
         engine.step(np.zeros(12))
-    robot, before = mechanics.momentum(), engine.read()
+    robot, before = mechanics.momentum(), engine.state()
     engine.attach_payload(mass, point)
     arm = rotation(before.quat_xyzw) @ np.asarray(point)
     ball = np.asarray(before.velocity) + np.cross(before.angular_velocity, arm)
@@ -361,7 +361,7 @@ def test_attaching_a_payload_makes_no_jump(engine_name: EngineName) -> None:
     for steps in (1, 100):
         for _ in range(steps):
             engine.step(np.zeros(12))
-        after = engine.read()
+        after = engine.state()
         total = mechanics.momentum()[:3] + mass * payload_velocity(engine)
         np.testing.assert_allclose(total, together, atol=float(2e-3 * np.linalg.norm(together)))
         if steps == 1:
@@ -574,7 +574,7 @@ def probe(env: Any, change: np.ndarray, joint: int = KNEE) -> tuple[np.ndarray, 
 def test_a_delay_of_n_samples_is_n_samples(
     samples: int, control_period: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    env = make({"torque_delay": samples}, control_period=control_period)
+    env = make({"action_delay": samples}, control_period=control_period)
     env.reset(seed=0)
     record, impulse = Recorder(env, monkeypatch), np.zeros(12)
     impulse[4] = 1.5
@@ -608,8 +608,8 @@ def test_motors_lag_exponentially(constant: float, control_period: float, monkey
 
 def in_the_air(env: Any) -> Mechanics:
     """Lifts the robot off the ground, its joints at rest where they are."""
-    q = env._engine.read().q
-    env._engine.place((0.0, 0.0, 5.0), q)
+    q = env._engine.state().q
+    env._engine.reset((0.0, 0.0, 5.0), q)
     return Mechanics(env._engine)
 
 
@@ -638,7 +638,9 @@ def test_the_robot_feels_the_lag(engine_name: EngineName) -> None:
 def test_a_lost_actuator_gives_its_share_from_its_start(
     control_period: float, start: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    env = make({"actuator_loss": {"joint": "left_knee", "factor": 0.3, "start": start}}, control_period=control_period)
+    env = make(
+        {"actuator_effectiveness": {"joint": "left_knee", "factor": 0.3, "start": start}}, control_period=control_period
+    )
     env.reset(seed=0)
     record, count = Recorder(env, monkeypatch), 30
     rest, applied = probe(env, np.zeros(count))
@@ -650,7 +652,7 @@ def test_a_lost_actuator_gives_its_share_from_its_start(
 
 
 def test_all_actuators_can_be_lost() -> None:
-    env = make({"actuator_loss": {"joint": "all", "factor": 0.5, "start": 0.02}})
+    env = make({"actuator_effectiveness": {"joint": "all", "factor": 0.5, "start": 0.02}})
     rest, applied = probe(env, np.zeros(10))
     np.testing.assert_allclose(applied, np.concatenate([[rest] * 5, [0.5 * rest] * 5]), rtol=1e-12)
 
@@ -661,14 +663,14 @@ def test_losses_start_on_time_wherever_they_fall() -> None:
 
     joints, one = ojas().actuated, np.ones(12)
     for step in (1, 9, 1001, 4097, 28001, 57999):
-        losses = {"actuator_loss": {"joint": "left_knee", "start": step / 1000}}
+        losses = {"actuator_effectiveness": {"joint": "left_knee", "start": step / 1000}}
         actuation = Actuation(realise(losses), joints, DT)
         actuation.start(one)
         acting = [actuation.advance(actuation.target(one), k)[KNEE] for k in range(step - 2, step + 2)]
         assert acting == [1.0, 1.0, 0.0, 0.0]
 
 
-# ---------------------------------------------------------------------------------------------------------- mass_error
+# ---------------------------------------------------------------------------------------------------------- mass_scale
 
 
 def scaled(spec: RobotSpec, factor: float) -> RobotSpec:
@@ -684,7 +686,7 @@ def scaled(spec: RobotSpec, factor: float) -> RobotSpec:
 def test_mass_error_scales_weight_and_inertia(
     engine_name: EngineName, factor: float, inertia: Literal["lumped", "rotor"]
 ) -> None:
-    env = make({"mass_error": factor}, actuator_inertia=inertia, engine=engine_name)
+    env = make({"mass_scale": factor}, actuator_inertia=inertia, engine=engine_name)
     episode = run(env, 250)
     assert episode.load[100:].mean() == pytest.approx(factor * WEIGHT, rel=2e-3)
 
@@ -694,10 +696,10 @@ def test_mass_error_scales_weight_and_inertia(
         in_the_air(env)
         tau = np.zeros(12)
         tau[joint] = 3.0
-        q = env._engine.read().q
+        q = env._engine.state().q
         env._engine.step(tau)
         expected = joint_acceleration(spec, q, tau)
-        measured = env._engine.read().qd / DT
+        measured = env._engine.state().qd / DT
         np.testing.assert_allclose(measured, expected, atol=2e-4 * np.abs(expected).max())
 
 
@@ -735,18 +737,18 @@ def test_an_initial_pose_starts_off_by_its_offset_at_rest(
 def test_an_initial_pose_can_name_all_joints(engine_name: EngineName) -> None:
     env = make({"initial_pose": {"joint": "all", "offset": {"uniform": [-0.02, 0.02]}}}, engine=engine_name)
     env.reset(seed=3)
-    realised = env.unwrapped.sampled_disturbances["initial_pose"]
-    assert [entry["joint"] for entry in realised] == list(ojas().actuated)
-    assert len({entry["offset"] for entry in realised}) == 12
-    error = env._engine.read().q - env.pattern.q[0]
-    np.testing.assert_allclose(error, [entry["offset"] for entry in realised], atol=0.012)
+    drawn = env.unwrapped.sampled_disturbances["initial_pose"]
+    assert [entry["joint"] for entry in drawn] == list(ojas().actuated)
+    assert len({entry["offset"] for entry in drawn}) == 12
+    error = env._engine.state().q - env.pattern.q[0]
+    np.testing.assert_allclose(error, [entry["offset"] for entry in drawn], atol=0.012)
 
 
 # --------------------------------------------------------------------------------------------------------- composition
 
 UNIFORM = {"uniform": [-0.01, 0.01]}
 EVERYTHING: dict[str, Any] = {
-    "payload": {"mass": {"uniform": [0.5, 1.5]}, "position": [UNIFORM, UNIFORM, 0.16], "drop": 0.9},
+    "payload": {"mass": {"uniform": [0.5, 1.5]}, "position": [UNIFORM, UNIFORM, 0.16], "detach_time": 0.9},
     "push": [
         {
             "body": "chest",
@@ -759,10 +761,10 @@ EVERYTHING: dict[str, Any] = {
     "friction": {"choice": [0.7, 0.8]},
     "slope": {"pitch_deg": {"uniform": [-1, 1]}, "roll_deg": {"uniform": [-1, 1]}},
     "encoder_bits": {"uniform": [18, 20]},
-    "torque_delay": {"choice": [0, 1]},
+    "action_delay": {"choice": [0, 1]},
     "motor_lag": {"uniform": [0.0005, 0.001]},
-    "actuator_loss": {"joint": "all", "factor": {"uniform": [0.9, 1.0]}, "start": 0.3},
-    "mass_error": {"normal": [1.0, 0.02]},
+    "actuator_effectiveness": {"joint": "all", "factor": {"uniform": [0.9, 1.0]}, "start": 0.3},
+    "mass_scale": {"normal": [1.0, 0.02]},
     "initial_pose": {"joint": "all", "offset": {"uniform": [-0.005, 0.005]}},
 }
 
@@ -774,29 +776,29 @@ def test_all_at_once_are_deterministic_and_can_be_repeated_from_what_was_drawn(e
     run(env, 30, seed=8)
     assert run(env, 600, seed=7).bits == first.bits
     assert run(make(EVERYTHING, **kwargs, engine=engine_name), 600, seed=7).bits == first.bits
-    realised = env.unwrapped.sampled_disturbances
-    assert realised.keys() == EVERYTHING.keys()
-    assert Disturbances.parse(realised, ("chest",), ojas().actuated).draw(np.random.default_rng(1)) == realised
-    assert run(make(realised, **kwargs, engine=engine_name), 600, seed=99).bits == first.bits
+    drawn = env.unwrapped.sampled_disturbances
+    assert drawn.keys() == EVERYTHING.keys()
+    assert Disturbances.parse(drawn, ("chest",), ojas().actuated).sample(np.random.default_rng(1)) == drawn
+    assert run(make(drawn, **kwargs, engine=engine_name), 600, seed=99).bits == first.bits
 
 
 def test_noise_comes_from_the_seed() -> None:
     env = make({**EVERYTHING, "sensor_noise": 1e-5}, control_period=0.001)
     first = run(env, 100, seed=7)
     assert run(env, 100, seed=7).bits == first.bits
-    realised = env.unwrapped.sampled_disturbances
-    repeated = make(realised, control_period=0.001)
+    drawn = env.unwrapped.sampled_disturbances
+    repeated = make(drawn, control_period=0.001)
     other = run(repeated, 100, seed=99)
-    assert repeated.unwrapped.sampled_disturbances == realised
+    assert repeated.unwrapped.sampled_disturbances == drawn
     assert other.bits != first.bits
 
 
 FORMER: list[dict[str, Any]] = [
-    {"mass_error": 1.4},
+    {"mass_scale": 1.4},
     {"friction": 0.1, "slope": {"roll_deg": 3.0}},
-    {"payload": {"mass": 2.0, "drop": 0.1}},
+    {"payload": {"mass": 2.0, "detach_time": 0.1}},
     {"initial_pose": {"joint": "left_knee", "offset": 0.1}},
-    {"actuator_loss": {"joint": "all"}, "torque_delay": 2, "motor_lag": 0.01},
+    {"actuator_effectiveness": {"joint": "all"}, "action_delay": 2, "motor_lag": 0.01},
 ]
 
 
@@ -830,9 +832,9 @@ def test_a_reset_without_a_disturbance_leaves_no_trace(
 
 def test_biped_push_has_the_pushes_of_the_thesis() -> None:
     env = gym.make("BipedPush-v0", disable_env_checker=True, actuator_inertia="lumped", duration=2.0)
-    realised = sampled(env, seed=0)
-    assert realised["payload"]["mass"] == 1.3
-    chest, arm = realised["push"]
+    drawn = sampled(env, seed=0)
+    assert drawn["payload"]["mass"] == 1.3
+    chest, arm = drawn["push"]
     assert chest == {"body": "chest", "magnitude": 10.0, "direction": [1.0, 0.0, 0.0], "start": 28.0, "duration": 0.2}
     assert (arm["body"], arm["magnitude"], arm["start"], arm["duration"]) == ("left_arm", 10.0, 37.0, 0.2)
     direction = np.array(arm["direction"]) / np.linalg.norm(arm["direction"])

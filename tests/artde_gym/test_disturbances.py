@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from artde_gym.disturbances import KINDS, Disturbances
-from artde_gym.disturbances.kinds import ROBOTS, Kind, Parameter, page
+from artde_gym.disturbances import DISTURBANCES, Disturbances
+from artde_gym.disturbances.kinds import ROBOTS, DisturbanceSpec, Parameter, page
 from artde_gym.errors import DisturbanceError
 
 SITES = ("torso", "chest", "left_arm", "right_arm")
@@ -23,16 +23,16 @@ def parse(given: Any) -> Disturbances:
 
 
 def draw(given: Any, seed: int = 0) -> dict[str, Any]:
-    return parse(given).draw(np.random.default_rng(seed))
+    return parse(given).sample(np.random.default_rng(seed))
 
 
 # --------------------------------------------------------------------------------------------------- valid disturbances
 
 
 def words(parameter: Parameter) -> tuple[str, ...]:
-    if isinstance(parameter.words, str):
-        return {"site": SITES, "joint": (*JOINTS, "all")}[parameter.words]
-    return parameter.words
+    if isinstance(parameter.choices, str):
+        return {"site": SITES, "joint": (*JOINTS, "all")}[parameter.choices]
+    return parameter.choices
 
 
 def inside(parameter: Parameter) -> st.SearchStrategy[float]:
@@ -70,7 +70,7 @@ def values(parameter: Parameter) -> st.SearchStrategy[Any]:
     return either.filter(may_be_nonzero) if parameter.nonzero else either
 
 
-def entry(kind: Kind) -> st.SearchStrategy[dict[str, Any]]:
+def entry(kind: DisturbanceSpec) -> st.SearchStrategy[dict[str, Any]]:
     def one(chosen: str) -> st.SearchStrategy[dict[str, Any]]:
         required = {p.name: values(p) for p in complete(kind, chosen) if p.default is None}
         optional = {p.name: values(p) for p in kind.parameters if p.default is not None}
@@ -79,31 +79,31 @@ def entry(kind: Kind) -> st.SearchStrategy[dict[str, Any]]:
     return st.sampled_from(kind.one_of or ("",)).flatmap(one)
 
 
-def complete(kind: Kind, chosen: str = "") -> list[Parameter]:
+def complete(kind: DisturbanceSpec, chosen: str = "") -> list[Parameter]:
     """The parameters of a whole entry, with the chosen one of those that exclude each other, or the first."""
     kept = chosen if chosen in kind.one_of else "".join(kind.one_of[:1])
     return [p for p in kind.parameters if p.name not in kind.one_of or p.name == kept]
 
 
-def whole(kind: Kind) -> st.SearchStrategy[Any]:
-    if kind.repeated:
+def whole(kind: DisturbanceSpec) -> st.SearchStrategy[Any]:
+    if kind.multiple:
         return entry(kind) | st.lists(entry(kind), max_size=3)
-    if kind.scalar is None:
+    if kind.shorthand is None:
         return entry(kind)
-    scalar = next(p for p in kind.parameters if p.name == kind.scalar)
+    scalar = next(p for p in kind.parameters if p.name == kind.shorthand)
     return entry(kind) | component(scalar)
 
 
-valid = st.fixed_dictionaries({}, optional={name: whole(kind) for name, kind in KINDS.items()})
+valid = st.fixed_dictionaries({}, optional={name: whole(kind) for name, kind in DISTURBANCES.items()})
 
 
-def check_realised(realised: dict[str, Any]) -> None:
+def check_realised(sampled: dict[str, Any]) -> None:
     """All values of the kinds that were drawn are plain, complete and allowed."""
-    for name, entries in realised.items():
-        for entry in entries if KINDS[name].repeated else [entries]:
-            chosen = next((one for one in KINDS[name].one_of if one in entry), "")
-            assert entry.keys() == {parameter.name for parameter in complete(KINDS[name], chosen)}
-            for parameter in complete(KINDS[name], chosen):
+    for name, entries in sampled.items():
+        for entry in entries if DISTURBANCES[name].multiple else [entries]:
+            chosen = next((one for one in DISTURBANCES[name].one_of if one in entry), "")
+            assert entry.keys() == {parameter.name for parameter in complete(DISTURBANCES[name], chosen)}
+            for parameter in complete(DISTURBANCES[name], chosen):
                 check_value(parameter, entry[parameter.name])
 
 
@@ -122,9 +122,9 @@ def check_value(parameter: Parameter, value: Any) -> None:
 
 @given(given_=valid, seed=st.integers(0, 2**32 - 1))
 def test_draws_are_plain_numbers_in_range_that_parse_back(given_, seed):
-    realised = draw(given_, seed)
-    check_realised(realised)
-    assert draw(json.loads(json.dumps(realised)), seed + 1) == realised
+    sampled = draw(given_, seed)
+    check_realised(sampled)
+    assert draw(json.loads(json.dumps(sampled)), seed + 1) == sampled
 
 
 @given(given_=valid, seed=st.integers(0, 2**32 - 1))
@@ -132,7 +132,7 @@ def test_json_round_trip(given_, seed):
     once = parse(given_)
     again = parse(json.loads(once.to_json()))
     assert again == once
-    assert again.draw(np.random.default_rng(seed)) == once.draw(np.random.default_rng(seed))
+    assert again.sample(np.random.default_rng(seed)) == once.sample(np.random.default_rng(seed))
 
 
 def backwards(value: Any) -> Any:
@@ -144,9 +144,9 @@ def backwards(value: Any) -> Any:
 
 @given(given_=valid, seed=st.integers(0, 2**32 - 1))
 def test_the_same_seed_draws_the_same_whatever_the_order_of_keys(given_, seed):
-    realised = draw(given_, seed)
-    assert draw(given_, seed) == realised
-    assert draw(backwards(given_), seed) == realised
+    sampled = draw(given_, seed)
+    assert draw(given_, seed) == sampled
+    assert draw(backwards(given_), seed) == sampled
 
 
 def test_short_forms():
@@ -165,12 +165,12 @@ def test_numpy_values_are_accepted():
         "friction": {"uniform": np.array([0.5, 0.5])},
         "push": ({"magnitude": np.int64(3), "start": np.float64(1.0), "direction": {"choice": np.eye(3)[:1]}},),
     }
-    realised = draw(numbers)
-    assert realised["payload"]["mass"] == 1.5
-    assert realised["payload"]["position"] == [0.0, 0.25, 0.5]
-    assert realised["friction"] == {"coefficient": 0.5}
-    assert realised["push"][0]["direction"] == [1.0, 0.0, 0.0]
-    json.dumps(realised)
+    sampled = draw(numbers)
+    assert sampled["payload"]["mass"] == 1.5
+    assert sampled["payload"]["position"] == [0.0, 0.25, 0.5]
+    assert sampled["friction"] == {"coefficient": 0.5}
+    assert sampled["push"][0]["direction"] == [1.0, 0.0, 0.0]
+    json.dumps(sampled)
     json.loads(parse(numbers).to_json())
 
 
@@ -179,7 +179,7 @@ def test_numpy_values_are_accepted():
 
 def sample(value: Any, count: int = 4000) -> np.ndarray:
     rng, disturbances = np.random.default_rng(16), parse({"payload": {"mass": 1.0, "position": value}})
-    return np.array([disturbances.draw(rng)["payload"]["position"] for _ in range(count)])
+    return np.array([disturbances.sample(rng)["payload"]["position"] for _ in range(count)])
 
 
 def test_uniform_and_choice_have_their_moments():
@@ -196,15 +196,15 @@ def test_normal_is_drawn_again_until_in_range():
     assert drawn.mean() == pytest.approx(0.5 - 0.2 * math.sqrt(2 / math.pi), abs=0.01)  # of a half-normal
 
 
-SCALARS = [(kind.name, p) for kind in KINDS.values() for p in kind.parameters if p.name == kind.scalar]
+SCALARS = [(kind.name, p) for kind in DISTURBANCES.values() for p in kind.parameters if p.name == kind.shorthand]
 
 
 @pytest.mark.parametrize(("kind", "parameter"), SCALARS, ids=lambda value: getattr(value, "name", value))
 def test_a_normal_that_misses_its_range_gives_its_mean(kind, parameter):
     mean = math.ceil(parameter.low) if parameter.integer else parameter.low
-    realised = draw({kind: {"normal": [mean, 1e308]}})
-    check_realised(realised)
-    assert realised[kind][parameter.name] == mean
+    sampled = draw({kind: {"normal": [mean, 1e308]}})
+    check_realised(sampled)
+    assert sampled[kind][parameter.name] == mean
 
 
 def test_choice_takes_vectors_and_distributions_within_them():
@@ -219,7 +219,7 @@ def test_normal_components_make_an_isotropic_planar_direction():
     normal = {"normal": [0, 1]}
     rng = np.random.default_rng(17)
     disturbances = parse({"push": [{"magnitude": 1, "start": 0, "direction": [normal, normal, 0]}]})
-    drawn = np.array([disturbances.draw(rng)["push"][0]["direction"] for _ in range(8000)])
+    drawn = np.array([disturbances.sample(rng)["push"][0]["direction"] for _ in range(8000)])
     assert np.all(drawn[:, 2] == 0)
     heading = np.arctan2(drawn[:, 1], drawn[:, 0])
     counts, _ = np.histogram(heading, bins=16, range=(-math.pi, math.pi))
@@ -315,7 +315,7 @@ def test_refusals_say_what_was_likely_meant():
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
-@pytest.mark.parametrize("kind", KINDS.values(), ids=list(KINDS))
+@pytest.mark.parametrize("kind", DISTURBANCES.values(), ids=list(DISTURBANCES))
 def test_a_robot_refuses_the_kinds_that_it_cannot_honour(robot, kind):
     example = {
         p.name: words(p)[0] if p.size == 0 else [p.low] * p.size if p.size > 1 else p.low
@@ -332,28 +332,34 @@ def test_a_robot_refuses_the_kinds_that_it_cannot_honour(robot, kind):
     assert caught.value.value == kind.name
     assert robot in caught.value.allowed
     named = caught.value.allowed.split(" (did you mean")[0].replace(",", "").split()
-    assert set(named) >= {other.name for other in KINDS.values() if other.honored_by(robot)}
-    assert set(named).isdisjoint(other.name for other in KINDS.values() if not other.honored_by(robot))
+    assert set(named) >= {other.name for other in DISTURBANCES.values() if other.honored_by(robot)}
+    assert set(named).isdisjoint(other.name for other in DISTURBANCES.values() if not other.honored_by(robot))
 
 
 def test_each_robot_has_its_kinds_and_defaults():
     assert {"friction", "slope", "grf_pulse", "encoder_bits", "initial_pose"} <= {
-        kind.name for kind in KINDS.values() if kind.honored_by("ojas") and not kind.honored_by("q450")
+        kind.name for kind in DISTURBANCES.values() if kind.honored_by("ojas") and not kind.honored_by("q450")
     }
     assert {"wind", "ground_effect", "initial_position", "cable_delay"} == {
-        kind.name for kind in KINDS.values() if kind.honored_by("q450") and not kind.honored_by("ojas")
+        kind.name for kind in DISTURBANCES.values() if kind.honored_by("q450") and not kind.honored_by("ojas")
     }
     push = {"magnitude": 1, "start": 0}
     for robot, body, place in (("ojas", "torso", [0.0, 0.0, 0.16]), ("q450", "body", [0.01, 0.0, -0.1])):
         parsed = Disturbances.parse({"payload": 1.0, "push": push}, (body, "other"), JOINTS, robot)
-        realised = parsed.draw(np.random.default_rng(0))
-        assert realised["payload"]["position"] == place
-        assert realised["push"][0]["body"] == body
-        assert Disturbances.parse(realised, (body,), JOINTS, robot).draw(np.random.default_rng(1)) == realised
+        sampled = parsed.sample(np.random.default_rng(0))
+        assert sampled["payload"]["position"] == place
+        assert sampled["push"][0]["body"] == body
+        assert Disturbances.parse(sampled, (body,), JOINTS, robot).sample(np.random.default_rng(1)) == sampled
 
 
-KEYS = [*KINDS, *(p.name for kind in KINDS.values() for p in kind.parameters), "uniform", "normal", "choice"]
-KEYS += [word for kind in KINDS.values() for p in kind.parameters for word in words(p)]
+KEYS = [
+    *DISTURBANCES,
+    *(p.name for kind in DISTURBANCES.values() for p in kind.parameters),
+    "uniform",
+    "normal",
+    "choice",
+]
+KEYS += [word for kind in DISTURBANCES.values() for p in kind.parameters for word in words(p)]
 atoms = (
     st.none()
     | st.booleans()
@@ -370,30 +376,35 @@ anything = st.recursive(
 
 
 @settings(max_examples=300)
-@given(given_=st.dictionaries(st.sampled_from(list(KINDS)), anything, max_size=3) | anything)
+@given(given_=st.dictionaries(st.sampled_from(list(DISTURBANCES)), anything, max_size=3) | anything)
 def test_whatever_is_given_is_read_or_refused(given_):
     try:
-        realised = draw(given_)
+        sampled = draw(given_)
     except DisturbanceError as error:
-        realised = {}
+        sampled = {}
         str(error)
-    check_realised(realised)
+    check_realised(sampled)
 
 
 @settings(max_examples=300)
-@given(name=st.sampled_from([(kind.name, p.name) for kind in KINDS.values() for p in kind.parameters]), value=anything)
+@given(
+    name=st.sampled_from([(kind.name, p.name) for kind in DISTURBANCES.values() for p in kind.parameters]),
+    value=anything,
+)
 def test_whatever_is_given_for_one_parameter_is_read_or_refused(name, value):
     kind, parameter = name
     base = {
-        p.name: words(p)[0] if p.size == 0 else p.low for p in complete(KINDS[kind], parameter) if p.default is None
+        p.name: words(p)[0] if p.size == 0 else p.low
+        for p in complete(DISTURBANCES[kind], parameter)
+        if p.default is None
     }
     field = ""
     try:
-        realised = draw({kind: {**base, parameter: value}})
+        sampled = draw({kind: {**base, parameter: value}})
     except DisturbanceError as error:
         field = error.field
     else:
-        check_realised(realised)
+        check_realised(sampled)
     assert not field or parameter in field
 
 

@@ -11,12 +11,12 @@ import pytest
 from typer.testing import CliRunner
 
 from artde_gym.cli import app
-from artde_gym.doctor import CHECKS, examination, examine
+from artde_gym.doctor import CHECKS, checks, run_checks
 from artde_gym.doctor.machine import extras, files, python
 from artde_gym.errors import UnknownNameError
-from controllers.checkup import validity
+from controllers.stability_check import stability
 
-LIGHT = ["python", "extras", "files", "batch", "determinism", "validity"]
+LIGHT = ["python", "extras", "files", "batch", "determinism", "stability"]
 """Checks that take no more than a few seconds; what the others call has tests of its own."""
 
 
@@ -42,13 +42,13 @@ def test_no_check_ends_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPATH", f"{Path(__file__).parent}:{os.environ.get('PYTHONPATH', '')}")
     monkeypatch.syspath_prepend(str(Path(__file__).parent))
     for name in ("raises", "dies", "exits", "hangs"):
-        monkeypatch.setitem(CHECKS, name, examination.Check(name, f"broken_checks:{name}"))
-    monkeypatch.setitem(CHECKS, "gone", examination.Check("gone", "artde_gym.nowhere:nothing"))
+        monkeypatch.setitem(CHECKS, name, checks.Check(name, f"broken_checks:{name}"))
+    monkeypatch.setitem(CHECKS, "gone", checks.Check("gone", "artde_gym.nowhere:nothing"))
     names = ["raises", "dies", "exits", "gone", "files"]
-    found = {name: report.outcomes for name, report in examine(names)}
+    found = {name: report.outcomes for name, report in run_checks(names)}
     with monkeypatch.context() as hurry:
-        hurry.setattr(examination, "PATIENCE", 0.5)
-        found |= {name: report.outcomes for name, report in examine(["hangs"])}
+        hurry.setattr(checks, "PATIENCE", 0.5)
+        found |= {name: report.outcomes for name, report in run_checks(["hangs"])}
     for name, words in (("raises", "a broken package (broken_checks.py"), ("dies", "exit code -11"),
                         ("exits", "exit code 3"), ("hangs", "no answer"), ("gone", "ModuleNotFoundError")):  # fmt: skip
         (line,) = found[name]
@@ -60,7 +60,7 @@ def test_no_check_ends_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "results folder: runs/ can be written" in outcome.output
     assert max(map(len, outcome.output.splitlines())) <= 80
     with pytest.raises(UnknownNameError, match="did you mean 'files'"):
-        list(examine(["fles"]))
+        list(run_checks(["fles"]))
 
 
 def test_a_wrong_python_a_missing_package_and_an_old_one(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -101,7 +101,7 @@ def _refused(**_: Any) -> Any:
 
 
 def test_validity_names_the_model_that_is_invalid_by_design() -> None:
-    lines = {line.what: line for line in validity()}
+    lines = {line.what: line for line in stability()}
     assert "outside" in lines["biped, actuators 'none'"].found
     low, high = map(float, lines["biped, actuators 'rotor'"].found.split(" to "))
     assert 0 < low < high < 2

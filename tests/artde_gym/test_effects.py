@@ -8,15 +8,27 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from artde_gym.disturbances import KINDS, Disturbances, Kind, Load, Parameter, RobotStates, register_disturbance
+from artde_gym.disturbances import (
+    DISTURBANCES,
+    Disturbances,
+    DisturbanceSpec,
+    Load,
+    Parameter,
+    RobotStates,
+    register_disturbance,
+)
 from artde_gym.errors import DisturbanceError, OptionError
 
 TORQUE = Parameter("torque", "Nm", 0.0, 20.0, None, "largest torque of friction, of each joint")
 SPEED = Parameter("speed", "rad/s", 1e-3, 10.0, 0.1, "at which it is three quarters of that")
-FRICTION = Kind("joint_friction", "Friction in the joints.", (TORQUE, SPEED), requires="joints", scalar="torque")
+FRICTION = DisturbanceSpec(
+    "joint_friction", "Friction in the joints.", (TORQUE, SPEED), requires="joints", shorthand="torque"
+)
 STIFFNESS = Parameter("stiffness", "N/m", 0.0, 100.0, None, "of the tether")
 ANCHOR = Parameter("anchor", "m", -5.0, 5.0, (0.0, 0.0, 0.5), "where it is tied to", size=3)
-TETHER = Kind("tether", "A spring from the base to a point.", (STIFFNESS, ANCHOR), requires="mass", repeated=True)
+TETHER = DisturbanceSpec(
+    "tether", "A spring from the base to a point.", (STIFFNESS, ANCHOR), requires="mass", multiple=True
+)
 WALK, FLIGHT = "BipedWalk-Payload-v0", "QuadInfinity-Payload-v0"
 EFFECTS = {
     WALK: {"joint_friction": {"torque": {"uniform": [0.2, 0.6]}}, "tether": [{"stiffness": 20.0}, {"stiffness": 5.0}]},
@@ -34,8 +46,8 @@ def tether(values, states: RobotStates) -> Load:
 
 @pytest.fixture(autouse=True)
 def registered(monkeypatch):
-    len(KINDS)
-    monkeypatch.setattr(KINDS, "_entries", dict(KINDS))
+    len(DISTURBANCES)
+    monkeypatch.setattr(DISTURBANCES, "_entries", dict(DISTURBANCES))
     register_disturbance(TETHER, tether)
     register_disturbance(FRICTION, friction)
 
@@ -107,9 +119,9 @@ def test_a_copy_goes_on_alike(duplicate):
 
 def test_the_same_is_drawn_whichever_kind_was_registered_first():
     given = {"tether": {"stiffness": {"uniform": [0, 9]}}, "joint_friction": {"uniform": [0, 9]}, "friction": 0.5}
-    drawn = [Disturbances.parse(given, (), ()).draw(np.random.default_rng(1))]
-    KINDS._entries["tether"] = KINDS._entries.pop("tether")
-    drawn.append(Disturbances.parse(given, (), ()).draw(np.random.default_rng(1)))
+    drawn = [Disturbances.parse(given, (), ()).sample(np.random.default_rng(1))]
+    DISTURBANCES._entries["tether"] = DISTURBANCES._entries.pop("tether")
+    drawn.append(Disturbances.parse(given, (), ()).sample(np.random.default_rng(1)))
     assert drawn[0] == drawn[1]
 
 
@@ -132,4 +144,4 @@ def test_a_name_is_taken_once():
     with pytest.raises(OptionError, match="not taken"):
         register_disturbance(TETHER, tether)
     with pytest.raises(OptionError, match="a new name"):
-        register_disturbance(KINDS["payload"], tether, replace=True)
+        register_disturbance(DISTURBANCES["payload"], tether, replace=True)

@@ -45,10 +45,10 @@ def short(controllers: Any = ("tde", "artde"), **kwargs: Any) -> Result:
 def test_wilson_interval_known_value() -> None:
     """8 of 10: 0.490 to 0.943 (Newcombe 1998's formula by hand with z = 1.959964)."""
     z, n, p = 1.959964, 10, 0.8
-    centre = (p + z**2 / (2 * n)) / (1 + z**2 / n)
+    center = (p + z**2 / (2 * n)) / (1 + z**2 / n)
     half = z / (1 + z**2 / n) * np.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
     estimate = statistics.rate(8, 10)
-    assert (estimate.low, estimate.high) == pytest.approx((centre - half, centre + half), abs=1e-5)
+    assert (estimate.low, estimate.high) == pytest.approx((center - half, center + half), abs=1e-5)
     assert statistics.rate(0, 5).low == 0
     assert statistics.rate(5, 5).high == pytest.approx(1)
 
@@ -199,7 +199,7 @@ def test_gains_reach_the_controller() -> None:
         ({"episodes": 0}, OptionError, ["episodes", "0"]),
         ({"workers": 0}, OptionError, ["workers", "0"]),
         ({"seed": -1}, OptionError, ["seed", "-1"]),
-        ({"trace_hz": 0.0}, OptionError, ["trace_hz"]),
+        ({"record_hz": 0.0}, OptionError, ["record_hz"]),
         ({"env_kwargs": {"durration": 1}}, OptionError, ["durration", "duration"]),
         ({"env_kwargs": {"control_period": 0.0011}}, OptionError, ["control_period", "0.0011"]),
         ({"env_kwargs": {"disturbances": {}}}, OptionError, ["env_kwargs", "disturbances"]),
@@ -250,7 +250,7 @@ def test_folder_holds_what_the_documentation_says(tmp_path: Path) -> None:
 
 
 def test_traces_at_full_rate_on_request(tmp_path: Path) -> None:
-    short(["tde"], episodes=1, out=tmp_path, trace_hz=float("inf"))
+    short(["tde"], episodes=1, out=tmp_path, record_hz=float("inf"))
     assert np.load(tmp_path / "traces" / "S2" / "tde-0.npz")["q"].shape == (101, 12)
 
 
@@ -391,7 +391,7 @@ def test_a_recovery_that_never_came_is_counted() -> None:
         | {"peak_error_m_drop": 0.25}
         for i, time in enumerate((1.0, 2.0, np.inf))
     ]
-    tracking = quadrotor_task.TRACKING
+    tracking = quadrotor_task.METRICS_SPEC
     for row in rows:
         row |= {
             f"{metric}_{tracked.unit}_{axis}": 0.1

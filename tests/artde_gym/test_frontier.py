@@ -18,11 +18,11 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from artde_gym.cli import app
-from artde_gym.disturbances import KINDS, Disturbances
+from artde_gym.disturbances import DISTURBANCES, Disturbances
 from artde_gym.errors import ArtdeGymError, DisturbanceError, OptionError, StoreError, UnknownNameError
 from artde_gym.evaluation import statistics
 from artde_gym.evaluation.tasks import Update
-from artde_gym.palette import LOOKS, OTHERS, looks
+from artde_gym.palette import OTHERS, STYLES, styles
 from artde_gym.studies import Frontier, frontier
 from artde_gym.studies.frontier.axis import Axis, axis
 from artde_gym.studies.frontier.bisection import search
@@ -177,10 +177,10 @@ def test_standard_test_is_the_same_but_for_what_is_varied() -> None:
     (push,) = test("push.magnitude")["push"]
     assert (push["body"], push["duration"], push["start"]) == ("chest", 0.2, {"uniform": [5.0, 7.0]})
     assert test("push.duration")["push"] == [push]
-    assert test("wind.scale", QUADROTOR)["payload"]["drop"] == 35.0
+    assert test("wind.scale", QUADROTOR)["payload"]["detach_time"] == 35.0
     assert "push" not in test("wind.scale", QUADROTOR)
     assert test("push.magnitude", QUADROTOR)["push"][0]["body"] == "body"
-    (loss,) = test("actuator_loss.factor", QUADROTOR)["actuator_loss"]
+    (loss,) = test("actuator_effectiveness.factor", QUADROTOR)["actuator_effectiveness"]
     assert loss == {"joint": "front_left", "start": {"uniform": [6.0, 16.0]}}
     with pytest.raises(OptionError, match="duration is 6"):
         standard_test(PUSH, "push.magnitude", {"duration": 6})
@@ -193,9 +193,9 @@ def test_same_draws_at_every_level() -> None:
     drawn = []
     for value in (varied.low, varied.high):
         disturbances, _ = varied.place(value, *standard_test(PUSH, varied.path, {}))
-        realised = Disturbances.parse(disturbances, SITES).draw(np.random.default_rng(3))
-        assert realised["push"][0].pop("magnitude") == value
-        drawn.append(realised)
+        sampled = Disturbances.parse(disturbances, SITES).sample(np.random.default_rng(3))
+        assert sampled["push"][0].pop("magnitude") == value
+        drawn.append(sampled)
     assert drawn[0] == drawn[1]
 
 
@@ -207,8 +207,8 @@ def test_place_leaves_the_rest_alone() -> None:
     assert arguments == {"speed": 0.1}
     two, _ = magnitude.place(7.0, {"push": [{"start": 1.0}, {"start": 2.0, "magnitude": 1.0}]}, {})
     assert [push["magnitude"] for push in two["push"]] == [7.0, 7.0]
-    placed, _ = axis(PUSH, "payload.drop", 0, 9, 1).place(4.0, given_, {})
-    assert placed["payload"] == {"mass": {"uniform": [1, 2]}, "drop": 4.0}
+    placed, _ = axis(PUSH, "payload.detach_time", 0, 9, 1).place(4.0, given_, {})
+    assert placed["payload"] == {"mass": {"uniform": [1, 2]}, "detach_time": 4.0}
     assert axis(PUSH, "control_period").place(0.004, given_, {}) == (given_, {"control_period": 0.004})
     with pytest.raises(OptionError, match="at least one 'push'"):
         magnitude.place(7.0, {"push": []}, {})
@@ -230,7 +230,7 @@ def test_place_leaves_the_rest_alone() -> None:
         ({"path": "push.magnitude", "tolerance": 0.0}, OptionError, ["tolerance", "0.0"]),
         ({"path": "push.magnitude", "tolerance": 61.0}, OptionError, ["tolerance", "60"]),
         ({"path": "push.magnitude", "harder": "bigger"}, OptionError, ["harder", "bigger", "'larger'"]),
-        ({"path": "torque_delay.samples", "tolerance": 0.5}, OptionError, ["tolerance", "0.5", "whole multiple of 1"]),
+        ({"path": "action_delay.steps", "tolerance": 0.5}, OptionError, ["tolerance", "0.5", "whole multiple of 1"]),
         ({"path": "control_period", "high": 0.0105}, OptionError, ["high", "0.0105", "whole multiple of 0.001"]),
         ({"path": "wind.scale"}, UnknownNameError, ["wind.scale", "push.magnitude"]),
     ],
@@ -244,7 +244,7 @@ def test_bad_axes_are_refused(arguments: dict[str, Any], error: type[ArtdeGymErr
 
 @pytest.mark.parametrize(("env_id", "robot"), [(PUSH, "ojas"), (QUADROTOR, "q450")])
 def test_paths_follow_the_grammar(env_id: str, robot: str) -> None:
-    for kind in KINDS.values():
+    for kind in DISTURBANCES.values():
         for parameter in kind.parameters:
             known = kind.honored_by(robot) and parameter in kind.parameters_for(robot)
             if parameter.size == 1 and not known:
@@ -330,7 +330,7 @@ def test_bad_arguments_leave_no_folder_behind(
 def test_quadrotors_in_batches(tmp_path: Path) -> None:
     """Four rotors lift 3.4 kg at most, the vehicle included: 0.5 kg are carried and 2.1 kg are not."""
     kwargs: dict[str, Any] = {"low": 0.5, "high": 2.1, "tolerance": 1.6, "episodes": 3, "env_kwargs": {"duration": 2.0}}
-    found = frontier(["artde"], QUADROTOR, "payload.mass", backend="batch", out=tmp_path / "run", **kwargs)
+    found = frontier(["artde"], QUADROTOR, "payload.mass", vectorized=True, out=tmp_path / "run", **kwargs)
     row = found.table.iloc[0]
     assert row["relation"] == "="
     assert row["low_rate"] == 1.0
@@ -368,10 +368,10 @@ def test_figure_of_every_outcome(harder: Any) -> None:
 
 
 def test_looks_are_fixed_and_tell_controllers_apart() -> None:
-    assert looks(["artde", "tde"])["tde"] == looks(["tde"])["tde"] == LOOKS["tde"]
-    everything = [*LOOKS.values(), *OTHERS]
-    assert len({look.colour for look in everything}) == len({look.marker for look in everything}) == len(everything)
-    assert looks(["mine"]) == {"mine": looks(["tde", "mine"])["mine"]}
-    many = looks(f"c{i}" for i in range(len(OTHERS)))
+    assert styles(["artde", "tde"])["tde"] == styles(["tde"])["tde"] == STYLES["tde"]
+    everything = [*STYLES.values(), *OTHERS]
+    assert len({look.color for look in everything}) == len({look.marker for look in everything}) == len(everything)
+    assert styles(["mine"]) == {"mine": styles(["tde", "mine"])["mine"]}
+    many = styles(f"c{i}" for i in range(len(OTHERS)))
     assert len(set(many.values())) == len(OTHERS)
-    assert len(looks(f"c{i}" for i in range(20))) == 20
+    assert len(styles(f"c{i}" for i in range(20))) == 20

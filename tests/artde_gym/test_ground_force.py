@@ -24,7 +24,7 @@ BRISK: dict[str, Any] = {"step_duration": 0.6, "duration": 6.0}  # the first foo
 
 
 def pulse_of(entry: dict[str, Any]) -> dict[str, Any]:
-    return Disturbances.parse({"grf_pulse": entry}, ()).draw(np.random.default_rng(0))["grf_pulse"]
+    return Disturbances.parse({"grf_pulse": entry}, ()).sample(np.random.default_rng(0))["grf_pulse"]
 
 
 def forces(entry: dict[str, Any], plan: list[float], loads: list[float]) -> np.ndarray:

@@ -27,7 +27,7 @@ def test_a_folder_of_odd_labels_is_read_and_gone_on_with(tmp_path):
     def run(episodes: int) -> pd.DataFrame:
         named = dict.fromkeys(LABELS, "tde")
         result = evaluate(
-            named, QUADROTOR, disturbances={}, env_kwargs=FLIGHT, backend="batch", episodes=episodes, out=tmp_path
+            named, QUADROTOR, disturbances={}, env_kwargs=FLIGHT, vectorized=True, episodes=episodes, out=tmp_path
         )
         return result.episodes
 
@@ -42,7 +42,7 @@ def test_a_frontier_of_odd_labels_is_read(tmp_path):
     labels = ["1", "NA", "true"]
     found = frontier(
         dict.fromkeys(labels, "tde"), QUADROTOR, "wind.scale", low=0, high=1, tolerance=1, episodes=1,
-        env_kwargs=FLIGHT, disturbances={"wind": 1.0}, out=tmp_path, backend="batch",
+        env_kwargs=FLIGHT, disturbances={"wind": 1.0}, out=tmp_path, vectorized=True,
     )  # fmt: skip
     read, _ = read_frontier(tmp_path)
     assert read.table["controller"].tolist() == labels

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import controllers
 from artde_gym.cli import app
 from artde_gym.cli.catalogue import TOPICS
-from artde_gym.disturbances import KINDS
+from artde_gym.disturbances import DISTURBANCES
 from artde_gym.registration import registered_controllers
 from artde_gym.scenarios import SCENARIOS
 from controllers.presets import named_gains
@@ -29,7 +29,14 @@ def test_everything_has_a_place_and_fits_a_narrow_terminal() -> None:
         text = listing(*arguments)
         assert max(map(len, text.splitlines())) <= 80
     text = listing()
-    for name in (*SCENARIOS, *registered_controllers(), *KINDS, "BipedPush-v0", "wind.scale", "bullet, mujoco, batch"):
+    for name in (
+        *SCENARIOS,
+        *registered_controllers(),
+        *DISTURBANCES,
+        "BipedPush-v0",
+        "wind.scale",
+        "bullet, mujoco, batch",
+    ):
         assert name in text
     text = listing("disturbances", "--name", "push")
     for word in ("torso", "chest", "0 to 500 N", "required", '{"uniform": [low, high]}'):
@@ -68,11 +75,11 @@ def _plain(value: Any) -> Any:
 
 def test_json_holds_the_schemas_of_the_disturbances() -> None:
     found = {entry["name"]: entry for entry in json.loads(listing("disturbances", "--json"))}
-    assert list(found) == list(KINDS)
+    assert list(found) == list(DISTURBANCES)
     (mass, *_) = found["payload"]["parameters"]
     assert (mass["name"], mass["unit"], mass["required"]) == ("mass", "kg", True)
     assert found["payload"]["bare_number"] == "mass"
-    assert "chest" in found["push"]["words"]["ojas"]["body"]
+    assert "chest" in found["push"]["choices"]["ojas"]["body"]
     scenarios = json.loads(listing("--json"))["scenarios"]
     assert scenarios[0]["engines"][:2] == ["bullet", "mujoco"]
 

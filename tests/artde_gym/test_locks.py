@@ -45,20 +45,20 @@ def holder(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
 
 def trained(folder: Path) -> Any:
     pytest.importorskip("stable_baselines3")
-    from baselines.recipe import Recipe
+    from baselines.residual_config import ResidualConfig
     from baselines.run import Training
     from baselines.train import train
 
-    return train(Training("QuadInfinity-Payload-v0", Recipe("q450")), folder)
+    return train(Training("QuadInfinity-Payload-v0", ResidualConfig("q450")), folder)
 
 
 def tuned_balance(folder: Path) -> Any:
     pytest.importorskip("cmaes")
-    from baselines.recipe import Recipe
+    from baselines.residual_config import ResidualConfig
     from baselines.run import Training
     from baselines.tune_balance import tune as tune_balance
 
-    return tune_balance(Training("BipedPush-v0", Recipe("ojas"), algo="cma-es"), folder)
+    return tune_balance(Training("BipedPush-v0", ResidualConfig("ojas"), algo="cma-es"), folder)
 
 
 WRITERS: dict[str, Callable[[Path], Any]] = {

@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 from artde_gym.disturbances.kinds import NEVER
 from artde_gym.evaluation.metrics import Metrics, events_of
 from artde_gym.layout import Layout
+from artde_gym.metrics_spec import MetricsSpec
 from artde_gym.robots.ojas import task as biped_task
 from artde_gym.robots.q450 import task as quadrotor_task
-from artde_gym.tracking import Tracking
 
 Signals = dict[str, np.ndarray]
-BIPED = biped_task.TRACKING, biped_task.OBSERVATION
-QUADROTOR = quadrotor_task.TRACKING, quadrotor_task.OBSERVATION
+BIPED = biped_task.METRICS_SPEC, biped_task.OBSERVATION
+QUADROTOR = quadrotor_task.METRICS_SPEC, quadrotor_task.OBSERVATION
 
 
 def blank(layout: Layout, samples: int) -> Signals:
@@ -31,7 +31,7 @@ def blank(layout: Layout, samples: int) -> Signals:
 
 
 def measure(
-    robot: tuple[Tracking, Layout],
+    robot: tuple[MetricsSpec, Layout],
     fields: Signals,
     diagnostics: Signals | None = None,
     period: float = 0.001,
@@ -134,14 +134,14 @@ def test_recovery_and_peak_of_a_push() -> None:
 
 def test_events_are_pushes_and_a_drop() -> None:
     push = {"start": 1.0, "duration": 0.2}
-    payload = {"mass": 1.0, "attach": 0.0, "drop": 35.0}
+    payload = {"mass": 1.0, "attach_time": 0.0, "detach_time": 35.0}
     assert events_of({"push": [push, push | {"start": 3.0}], "payload": payload}) == {
         "push0": (1.0, 1.2),
         "push1": (3.0, 3.2),
         "drop": (35.0, 35.0),
     }
-    assert events_of({"payload": payload | {"drop": NEVER}}) == {}
-    assert events_of({"payload": payload | {"attach": 40.0}}) == {}
+    assert events_of({"payload": payload | {"detach_time": NEVER}}) == {}
+    assert events_of({"payload": payload | {"attach_time": 40.0}}) == {}
     assert events_of({}) == {}
 
 

@@ -78,7 +78,7 @@ def test_mass_matrix_and_bias_agree_with_pinocchio(name: str, seed: int, judge: 
 @every_spec
 def test_mass_and_height(name: str) -> None:
     engine = MujocoEngine(SPECS[name])
-    engine.place((0.0, 0.0, 1.0), np.zeros(12))
+    engine.reset((0.0, 0.0, 1.0), np.zeros(12))
     model, data = engine._model, engine._data
     mj.mj_kinematics(model, data)
     assert abs(model.body_mass.sum() - 8.986) < 1e-12
@@ -91,10 +91,10 @@ def test_mass_and_height(name: str) -> None:
 def test_free_fall_is_exact() -> None:
     """A semi-implicit step at a constant acceleration: v_n = -g n dt, z_n = z_0 - g dt^2 n (n + 1) / 2."""
     engine, n = MujocoEngine(SPECS["rotor-fixed"], DT), 400
-    engine.place((0.0, 0.0, 5.0), np.linspace(-0.3, 0.4, 12))
+    engine.reset((0.0, 0.0, 5.0), np.linspace(-0.3, 0.4, 12))
     for _ in range(n):
         engine.step(np.zeros(12))
-    state = engine.read()
+    state = engine.state()
     np.testing.assert_allclose(state.velocity, (0.0, 0.0, -GRAVITY * n * DT), atol=1e-10)
     np.testing.assert_allclose(state.position, (0.0, 0.0, 5.0 - GRAVITY * DT**2 * n * (n + 1) / 2), atol=1e-10)
     np.testing.assert_allclose(state.angular_velocity, 0.0, atol=1e-10)
@@ -110,7 +110,7 @@ def drift(dt: float) -> tuple[float, float, float]:
     Coordinates(engine).set(0.3 * q, v, rot)
 
     def conserved() -> tuple[np.ndarray, np.ndarray, float]:
-        state = engine.read()
+        state = engine.state()
         velocity = np.concatenate([state.velocity, state.angular_velocity, state.qd])
         matrix = tree.mass_matrix(state.q, Rotation.from_quat(state.quat_xyzw).as_matrix())
         linear, angular = (matrix[:6] @ velocity).reshape(2, 3)
@@ -156,7 +156,7 @@ def test_friction_is_that_of_the_pair_alone() -> None:
     """No shape has a friction of its own that the solver could combine with another's: contacts are pairs only."""
     engine = MujocoEngine(SPECS["rotor-fixed"])
     engine.set_friction(0.37)
-    engine.place((0.0, 0.0, 0.449), np.zeros(12))
+    engine.reset((0.0, 0.0, 0.449), np.zeros(12))
     engine.step(np.zeros(12))
     model, data = engine._model, engine._data
     assert not model.geom_contype.any()
@@ -168,10 +168,10 @@ def test_friction_is_that_of_the_pair_alone() -> None:
 def test_a_robot_that_diverges_does_not_jump_to_its_start(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)  # for MuJoCo's own log of it
     engine = MujocoEngine(SPECS["none-fixed"])
-    engine.place((0.0, 0.0, 0.45), np.zeros(12))
+    engine.reset((0.0, 0.0, 0.45), np.zeros(12))
     engine._data.qvel[2] = -np.inf
     engine.step(np.zeros(12))
-    assert not np.isfinite(engine.read().position).all()
+    assert not np.isfinite(engine.state().position).all()
 
 
 @every_spec
@@ -204,9 +204,9 @@ def numbers(element: ET.Element, attribute: str) -> tuple[float, ...]:
 
 def test_held_arms_stay_at_zero() -> None:
     engine = MujocoEngine(SPECS["rotor-revolute"])
-    engine.place((0.0, 0.0, 3.0), np.zeros(12))
+    engine.reset((0.0, 0.0, 3.0), np.zeros(12))
     for _ in range(300):
-        engine.push("torso", (0.0, 0.0, 8.986 * GRAVITY))  # in a hover, so that gravity pulls at the arms
+        engine.apply_force("torso", (0.0, 0.0, 8.986 * GRAVITY))  # in a hover, so that gravity pulls at the arms
         engine.step(np.zeros(12))
     arms = [
         engine._data.joint(link.name).qpos[0] for link in engine.spec.joints if link.name not in engine.spec.actuated

@@ -32,7 +32,7 @@ def make(env_id: str = WALK, **kwargs: Any) -> Any:
 def cube() -> RobotSpec:
     """Black, so that it differs from everything else."""
     link = box_link("cube", 1.0, (0.1, 0.1, 0.1), (0.0, 0.0, 0.0))
-    black = dataclasses.replace(link.visuals[0], colour=(0.05, 0.05, 0.05, 1.0))
+    black = dataclasses.replace(link.visuals[0], color=(0.05, 0.05, 0.05, 1.0))
     return RobotSpec("cube", (dataclasses.replace(link, visuals=(black,)),), (), 0.0)
 
 
@@ -51,8 +51,8 @@ def run(env: Any, steps: int, *, draw: bool = False) -> np.ndarray:
     return np.array(seen)
 
 
-def like(picture: np.ndarray, colour: tuple[int, ...]) -> np.ndarray:
-    return np.abs(picture.astype(int) - colour).max(axis=-1) < 12
+def like(picture: np.ndarray, color: tuple[int, ...]) -> np.ndarray:
+    return np.abs(picture.astype(int) - color).max(axis=-1) < 12
 
 
 @pytest.mark.parametrize("pitch", [0.0, 25.0])
@@ -60,7 +60,7 @@ def test_a_camera_projects_as_engines_do(drawing_engine: EngineName, pitch: floa
     engine = make_engine(drawing_engine, cube(), 0.001, renders=True)
     camera = Camera((0.0, 0.0, 1.0), distance=2.5, yaw_deg=33.0, pitch_deg=pitch, width=400, height=300)
     for place in ((0.0, 0.0, 1.0), (0.5, -0.2, 1.3), (-0.4, 0.5, 0.8)):
-        engine.place(place, np.zeros(0))
+        engine.reset(place, np.zeros(0))
         picture = engine.render(camera).astype(int)
         rows, columns = np.nonzero(picture.max(axis=-1) < 60)
         expected = camera.pixels([place])[0]
@@ -77,7 +77,7 @@ def test_what_is_behind_the_eye_has_no_pixel() -> None:
 
 def test_the_sun_casts_a_shadow_where_geometry_says(drawing_engine: EngineName) -> None:
     engine = make_engine(drawing_engine, cube(), 0.001, renders=True)
-    engine.place((0.0, 0.0, 0.6), np.zeros(0))
+    engine.reset((0.0, 0.0, 0.6), np.zeros(0))
     camera = Camera((0.0, 0.0, 0.3), distance=3.0, pitch_deg=35.0)
     picture = engine.render(camera).astype(int)
     x, y, z = SUN
@@ -92,8 +92,8 @@ def test_a_shadow_is_a_projection_along_the_sun_of_every_box() -> None:
     """Corners of a robot's boxes, by its rigid-body algebra, fall into the hull of its shadow's polygons."""
     spec, rng = ojas("none"), np.random.default_rng(0)
     engine = make_engine("bullet", spec, 0.001)
-    engine.place((0.3, -0.1, 1.0), rng.uniform(-0.5, 0.5, 12))
-    state = engine.read()
+    engine.reset((0.3, -0.1, 1.0), rng.uniform(-0.5, 0.5, 12))
+    state = engine.state()
     points = np.concatenate(Shadow(spec).polygons(state, None))
     assert np.array_equal(points[:, 2], np.zeros(len(points)))
     frames = RigidBodyTree(spec).frames(state.q, np.array(matrix(state.quat_xyzw)).reshape(3, 3))
@@ -112,11 +112,11 @@ def test_a_site_is_where_rigid_body_algebra_has_it(engine_name: EngineName) -> N
     spec = ojas("lumped")
     engine = make_engine(engine_name, spec, 0.001)
     engine.set_friction(0.8)
-    engine.place((0.3, -0.2, 2.0), np.linspace(-0.4, 0.5, 12))
+    engine.reset((0.3, -0.2, 2.0), np.linspace(-0.4, 0.5, 12))
     for _ in range(30):
-        engine.push_base((0.0, 0.0, 0.0), (2.0, 1.0, 0.5))
+        engine.apply_base_wrench((0.0, 0.0, 0.0), (2.0, 1.0, 0.5))
         engine.step(np.zeros(12))
-    state, tree = engine.read(), RigidBodyTree(spec)
+    state, tree = engine.state(), RigidBodyTree(spec)
     frames = tree.frames(state.q, np.array(matrix(state.quat_xyzw)).reshape(3, 3))
     names = [link.name for link in spec.merged().links]
     for name, link, offset in spec.sites:

@@ -48,7 +48,7 @@ BAD: dict[str, list[Any]] = {
 BAD_OF_EPISODES: dict[str, list[Any]] = {
     "episodes": [0, -1, 1.5, None, True],
     "workers": [0, -1, 1.5, None],
-    "backend": ["nothing", None, 3],
+    "vectorized": ["nothing", None, 3],
 }
 
 

@@ -26,7 +26,7 @@ WORLD: dict[str, Any] = {
     "mass_distribution": {"uniform": [0.7, 1.3]},
     "contact": {"uniform": [0.0025, 0.01]},
     "torque_limit": {"uniform": [3.0, 20.0]},
-    "mass_error": {"uniform": [0.85, 1.15]},
+    "mass_scale": {"uniform": [0.85, 1.15]},
 }
 
 
@@ -46,9 +46,9 @@ def make(disturbances: dict[str, Any], **kwargs: Any) -> Any:
 def start_in_free_fall(engine: Engine) -> np.ndarray:
     """Joint accelerations (12,) under unit torques without gravity, from rest."""
     engine.set_gravity((0.0, 0.0, 0.0))
-    engine.place((0.0, 0.0, 3.0), np.full(12, 0.1))
+    engine.reset((0.0, 0.0, 3.0), np.full(12, 0.1))
     engine.step(np.ones(12))
-    return engine.read().qd / DT
+    return engine.state().qd / DT
 
 
 def expected_in_free_fall(engine: Engine, spec: RobotSpec) -> np.ndarray:
@@ -112,11 +112,11 @@ def test_soft_contacts_let_feet_sink_in_mujoco() -> None:
         made = make_engine("mujoco", ojas(), DT)
         made.set_friction(0.8)
         made.set_contact_time(time)
-        made.place((0.0, 0.0, 0.45), np.zeros(12))
+        made.reset((0.0, 0.0, 0.45), np.zeros(12))
         for _ in range(1500):
-            state = made.read()
+            state = made.state()
             made.step(-400.0 * state.q - 10.0 * state.qd)
-        depths.append(0.45 - made.read().position[2])
+        depths.append(0.45 - made.state().position[2])
         made.close()
     assert depths[1] / depths[0] == pytest.approx(4.0, rel=0.2)
 
@@ -127,10 +127,10 @@ def test_bullet_corrects_the_depth_with_the_time_constant(time: float) -> None:
     made = make_engine("bullet", ojas("lumped"), DT)
     made.set_friction(0.8)
     made.set_contact_time(time)
-    made.place((0.0, 0.0, 0.449), np.zeros(12))
+    made.reset((0.0, 0.0, 0.449), np.zeros(12))
     depths = []
     for _ in range(10):
-        state = made.read()
+        state = made.state()
         depths.append(0.45 - state.position[2])
         made.step(-400.0 * state.q - 10.0 * state.qd)
     made.close()

@@ -78,9 +78,9 @@ def test_an_episode_that_is_only_watched_is_that_of_evaluate() -> None:
     for _ in range(250):
         action, state = policy.predict(observation, state)
         observation, *_ = env.step(action)
-    assert np.array_equal(plant.engine.read().q, env.unwrapped.engine.read().q)
+    assert np.array_equal(plant.engine.state().q, env.unwrapped.engine.state().q)
     assert played.time_s == 1.0
-    assert screen.states[-1][0].position == env.unwrapped.engine.read().position
+    assert screen.states[-1][0].position == env.unwrapped.engine.state().position
     assert screen.words[0].startswith("tde   t = 1 s   push 20 N")
 
 
@@ -89,10 +89,10 @@ def test_arrow_keys_push_from_four_sides(key: str) -> None:
     """A vehicle in the air gets most of the push's momentum, since its controller resists."""
     played, screen, plant = session("QuadInfinity-Payload-v0", **FLIGHT)
     turns(played, 0.2)
-    before = np.array(plant.engine.read().velocity)
+    before = np.array(plant.engine.state().velocity)
     screen.waiting = [key]
     turns(played, 0.2)
-    gained = np.array(plant.engine.read().velocity) - before
+    gained = np.array(plant.engine.state().velocity) - before
     direction = np.array(DIRECTIONS[key])
     momentum = 3.0 * 0.2 / 1.83
     assert 0.5 * momentum < gained @ direction < momentum

@@ -18,9 +18,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import artde_gym  # noqa: F401  # registers the environments
-from artde_gym.disturbances import KINDS
+from artde_gym.disturbances import DISTURBANCES
 from artde_gym.errors import ArtdeGymError
-from artde_gym.sim.bare import open_clients
+from artde_gym.sim.engine_loops import open_clients
 
 REFUSED = (ArtdeGymError, gym.error.Error, gym.error.ClosedEnvironmentError)
 SINGLE = ("BipedWalk-Payload-v0", "BipedPush-v0", "QuadInfinity-Payload-v0")
@@ -55,20 +55,20 @@ VALUES = st.one_of(ANYTHING, DISTRIBUTION, st.lists(st.one_of(NUMBERS, DISTRIBUT
 
 
 def entries(kind: str) -> st.SearchStrategy[Any]:
-    names = [parameter.name for parameter in KINDS[kind].parameters]
+    names = [parameter.name for parameter in DISTURBANCES[kind].parameters]
     one = st.one_of(VALUES, st.dictionaries(st.one_of(st.sampled_from(names), WORDS), VALUES, max_size=len(names)))
     return st.one_of(one, st.lists(one, max_size=3))
 
 
-DISTURBANCES = st.one_of(
+ANY_DISTURBANCES = st.one_of(
     ANYTHING,
-    st.lists(st.sampled_from([*KINDS, "nothing"]), max_size=3, unique=True).flatmap(
-        lambda kinds: st.fixed_dictionaries({kind: entries(kind) if kind in KINDS else VALUES for kind in kinds})
+    st.lists(st.sampled_from([*DISTURBANCES, "nothing"]), max_size=3, unique=True).flatmap(
+        lambda kinds: st.fixed_dictionaries({kind: entries(kind) if kind in DISTURBANCES else VALUES for kind in kinds})
     ),
 )
 PERIODS = st.sampled_from([0.001, 0.004, 0.005, 0.015, 0.05, 0.0011])
 ARGUMENTS: dict[str, st.SearchStrategy[Any]] = {
-    "disturbances": DISTURBANCES,
+    "disturbances": ANY_DISTURBANCES,
     "control_period": st.one_of(PERIODS, ANYTHING),
     "actuator_inertia": st.one_of(st.sampled_from(["rotor", "lumped", "none"]), ANYTHING),
     "arms": st.one_of(st.sampled_from(["fixed", "revolute"]), ANYTHING),
@@ -143,7 +143,7 @@ SEEDS = st.one_of(st.none(), st.integers(0, 10), ANYTHING)
 OPTIONS = st.one_of(
     st.none(),
     ANYTHING,
-    st.fixed_dictionaries({}, optional={"disturbances": DISTURBANCES, "scenario": st.one_of(WORDS, ANYTHING)}),
+    st.fixed_dictionaries({}, optional={"disturbances": ANY_DISTURBANCES, "scenario": st.one_of(WORDS, ANYTHING)}),
 )
 
 

@@ -26,7 +26,7 @@ HOVER = np.array([WEIGHT, 0.0, 0.0, 0.0])
 Pilot = Callable[[np.ndarray], np.ndarray]
 
 VARIED: dict[str, Any] = {
-    "payload": {"mass": {"uniform": [0.1, 0.4]}, "drop": 1.0},
+    "payload": {"mass": {"uniform": [0.1, 0.4]}, "detach_time": 1.0},
     "wind": {"uniform": [0.5, 2.0]},
     "ground_effect": 1.0,
     "push": [{"magnitude": {"uniform": [0.5, 2]}, "start": 0.5, "duration": 0.1}],
@@ -269,7 +269,7 @@ def test_reset_options_replace_disturbances() -> None:
     env = make()
     default = sampled(env, seed=0)
     assert default["payload"]["mass"] == 0.35
-    assert default["payload"]["drop"] == 35.0
+    assert default["payload"]["detach_time"] == 35.0
     assert default.keys() == {"payload", "wind", "ground_effect"}
     calm = sampled(env, seed=0, options={"disturbances": {"payload": 0.2}})
     assert calm.keys() == {"payload"}
@@ -295,7 +295,7 @@ def test_reset_options_replace_disturbances() -> None:
         ({"disturbances": {"wind": float("nan")}}, ["wind.scale", "nan"]),
         ({"disturbances": {"friction": 0.5}}, ["friction", "q450", "wind", "ground_effect"]),
         ({"disturbances": {"push": {"magnitude": 1, "start": 0, "body": "torso"}}}, ["torso", "body", "rear_left"]),
-        ({"disturbances": {"actuator_loss": {"joint": "left_knee"}}}, ["left_knee", "front_right", "all"]),
+        ({"disturbances": {"actuator_effectiveness": {"joint": "left_knee"}}}, ["left_knee", "front_right", "all"]),
         ({"disturbances": 3}, ["disturbances", "3"]),
     ],
 )
@@ -342,7 +342,7 @@ def test_closing_twice_is_safe() -> None:
 
 def test_docstring_is_the_documentation() -> None:
     from artde_gym.envs.quadrotor import QuadInfinityPayloadEnv
-    from artde_gym.envs.quadrotor_batch import QuadInfinityPayloadVectorEnv
+    from artde_gym.envs.quadrotor_vector import QuadInfinityPayloadVectorEnv
 
     for page in (QuadInfinityPayloadEnv.__doc__, QuadInfinityPayloadVectorEnv.__doc__):
         assert page is not None

@@ -12,7 +12,7 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode
 
 import artde_gym  # noqa: F401  (registers the environments)
-from artde_gym.envs import quadrotor_batch
+from artde_gym.envs import quadrotor_vector
 from artde_gym.errors import ActionError, ArtdeGymError, OptionError
 
 ID = "QuadInfinity-Payload-v0"
@@ -20,7 +20,11 @@ WEIGHT = 1.48 * 9.81
 Pilot = Callable[[np.ndarray], np.ndarray]
 
 VARIED: dict[str, Any] = {
-    "payload": {"mass": {"uniform": [0.1, 0.4]}, "drop": {"uniform": [0.3, 0.9]}, "attach": {"choice": [0.0, 0.1]}},
+    "payload": {
+        "mass": {"uniform": [0.1, 0.4]},
+        "detach_time": {"uniform": [0.3, 0.9]},
+        "attach_time": {"choice": [0.0, 0.1]},
+    },
     "wind": {"choice": [0.0, 1.0, 3.0]},
     "ground_effect": {"choice": [0.0, 5.0]},
     "push": [
@@ -28,10 +32,10 @@ VARIED: dict[str, Any] = {
         {"magnitude": {"choice": [0.0, 1.0]}, "direction": [0, 1, 1], "start": 0.31, "duration": 0.0333},
     ],
     "sensor_noise": {"position": {"choice": [0.0, 0.001]}, "tilt": {"choice": [0.0, 0.002]}},
-    "torque_delay": {"choice": [0, 1, 2]},
+    "action_delay": {"choice": [0, 1, 2]},
     "motor_lag": {"choice": [0.0, 0.035, 0.05]},
-    "actuator_loss": [{"joint": "all", "factor": {"uniform": [0.9, 1.0]}, "start": 0.4}],
-    "mass_error": {"uniform": [0.9, 1.1]},
+    "actuator_effectiveness": [{"joint": "all", "factor": {"uniform": [0.9, 1.0]}, "start": 0.4}],
+    "mass_scale": {"uniform": [0.9, 1.1]},
     "initial_position": {"offset": [{"normal": [0.0, 0.02]}, {"normal": [0.0, 0.02]}, 0.0]},
 }
 
@@ -56,7 +60,7 @@ def actions_of(pilot: Pilot, observations: np.ndarray) -> np.ndarray:
 
 
 def flown(env: Any, pilot: Pilot, seed: Any, steps: int) -> list[tuple[bytes, ...]]:
-    """What each environment saw: observations, rewards, ends, and realised disturbances."""
+    """What each environment saw: observations, rewards, ends, and drawn disturbances."""
     observations, _ = env.reset(seed=seed)
     drawn = [repr(one).encode() for one in env.sampled_disturbances]
     seen = [(observation.tobytes(), one) for observation, one in zip(observations, drawn, strict=True)]
@@ -80,7 +84,7 @@ def test_batch_is_loop_to_the_bit(kwargs: dict[str, Any], pilot: Pilot, monkeypa
     loop = [flown(make(1, **arguments), pilot, [seed], steps)[0] for seed in seeds]
     together = flown(make(7, **arguments), pilot, seeds, steps)
     assert together == loop
-    monkeypatch.setattr(quadrotor_batch, "FLEET", 3)  # simulated in fleets of 3, 3 and 1
+    monkeypatch.setattr(quadrotor_vector, "FLEET", 3)  # simulated in fleets of 3, 3 and 1
     assert flown(make(7, **arguments), pilot, seeds, steps) == loop
 
 
@@ -153,7 +157,7 @@ def test_observations_are_new_arrays_with_contiguous_components() -> None:
 
 def test_it_is_made_by_the_vector_entry_point() -> None:
     env: Any = make(4096, dtype="float32")
-    assert isinstance(env, quadrotor_batch.QuadInfinityPayloadVectorEnv)
+    assert isinstance(env, quadrotor_vector.QuadInfinityPayloadVectorEnv)
     assert env.num_envs == 4096
     assert env.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
     assert env.spec is not None
@@ -185,7 +189,7 @@ def test_same_seed_same_bits_after_other_flights(pilot: Pilot) -> None:
 
 def test_autoreset_is_that_of_gymnasiums_own_vector(pilot: Pilot) -> None:
     """Beside Gymnasium's `SyncVectorEnv` over single environments: ends, rewards, masks and restarts come alike."""
-    disturbances = {"payload": {"mass": {"uniform": [0.1, 0.4]}}, "mass_error": {"uniform": [0.95, 1.05]}}
+    disturbances = {"payload": {"mass": {"uniform": [0.1, 0.4]}}, "mass_scale": {"uniform": [0.95, 1.05]}}
     arguments: dict[str, Any] = {"disturbances": disturbances, "duration": 0.6}
     ours = make(3, **arguments)
     theirs: Any = gym.make_vec(ID, num_envs=3, vectorization_mode="sync", **arguments)
@@ -292,7 +296,7 @@ def test_reset_may_change_disturbances() -> None:
 )
 def test_bad_arguments_name_field_value_and_what_is_allowed(kwargs: dict[str, Any], words: list[str]) -> None:
     with pytest.raises(ArtdeGymError) as caught:
-        quadrotor_batch.QuadInfinityPayloadVectorEnv(**{"engine": "numpy", **kwargs})
+        quadrotor_vector.QuadInfinityPayloadVectorEnv(**{"engine": "numpy", **kwargs})
     for word in (*words, "allowed"):
         assert word in str(caught.value)
 

@@ -188,7 +188,7 @@ def test_it_starts_in_balance_with_the_payload(kind: str) -> None:
 
 
 @EVERY_KIND
-def test_without_the_payloads_moment_it_pitches_about_the_common_centre(kind: str) -> None:
+def test_without_the_payloads_moment_it_pitches_about_the_common_center(kind: str) -> None:
     flight = Flight(
         kind,
         loaded(
@@ -201,7 +201,7 @@ def test_without_the_payloads_moment_it_pitches_about_the_common_centre(kind: st
     end = flight.fly(np.array([total, 0.0, 0.0, 0.0]), 0.03)
     share = PAYLOAD / (q450.MASS + PAYLOAD)
     inertia = q450.INERTIA[1] + q450.MASS * share * 0.05**2 + 0.4 * PAYLOAD * 0.08**2
-    moment = share * 0.05 * total  # of the thrust about the common centre of mass
+    moment = share * 0.05 * total  # of the thrust about the common center of mass
     assert end["body_rates"][-1, 1] == pytest.approx(0.03 * moment / inertia, rel=0.02)
 
 
@@ -265,8 +265,8 @@ def test_a_steady_wind_takes_it_along(kind: str) -> None:
 
 @EVERY_KIND
 def test_the_fan_blows_along_its_axis_and_harder_on_it(kind: str) -> None:
-    wind = {"ambient": 0.0, "turbulence": 0.0, "fan_place": [0.0, 0.0, 0.6], "fan_direction": [0.0, 3.0, 0.0]}
-    aside = {**wind, "fan_place": [0.3, 0.0, 0.6]}
+    wind = {"ambient": 0.0, "turbulence": 0.0, "fan_position": [0.0, 0.0, 0.6], "fan_direction": [0.0, 3.0, 0.0]}
+    aside = {**wind, "fan_position": [0.3, 0.0, 0.6]}
     speeds = []
     for disturbance in (wind, aside):
         flight = Flight(kind, {"wind": disturbance})
@@ -327,7 +327,7 @@ def test_ground_effect_rights_a_tilted_vehicle(kind: str) -> None:
 
 @EVERY_KIND
 def test_commands_come_late_by_whole_periods(kind: str) -> None:
-    flight = Flight(kind, {"torque_delay": 3, "motor_lag": 0.0})
+    flight = Flight(kind, {"action_delay": 3, "motor_lag": 0.0})
     flight.reset()
     thrusts = [flight.step(np.array([15.0 + k, 0.0, 0.0, 0.0]))["wrench_applied"][0] for k in range(6)]
     np.testing.assert_allclose(thrusts, [WEIGHT, WEIGHT, WEIGHT, 15.0, 16.0, 17.0], rtol=1e-12)
@@ -336,7 +336,7 @@ def test_commands_come_late_by_whole_periods(kind: str) -> None:
 @EVERY_KIND
 def test_a_rotor_loses_its_share_at_its_time(kind: str) -> None:
     losses = [{"joint": "rear_right", "factor": 0.5, "start": 0.05}, {"joint": "all", "factor": 0.9, "start": 0.1}]
-    flight = Flight(kind, {"actuator_loss": losses, "motor_lag": 0.0})
+    flight = Flight(kind, {"actuator_effectiveness": losses, "motor_lag": 0.0})
     flight.reset()
     fields = flight.fly(HOVER, 0.15)
     shares = fields["rotor_thrust"] / (WEIGHT / 4)
@@ -349,7 +349,7 @@ def test_a_rotor_loses_its_share_at_its_time(kind: str) -> None:
 
 @EVERY_KIND
 def test_mass_error_scales_weight_and_inertia(kind: str) -> None:
-    flight = Flight(kind, {"mass_error": 1.3, "motor_lag": 0.0})
+    flight = Flight(kind, {"mass_scale": 1.3, "motor_lag": 0.0})
     start = flight.reset()
     np.testing.assert_allclose(start["wrench_applied"], 1.3 * HOVER, atol=1e-12)
     end = flight.fly(1.3 * HOVER + [2.0, 0.02, 0.0, 0.0], 0.05)
@@ -392,13 +392,13 @@ def test_sensor_noise_has_the_deviations_that_were_asked_for(kind: str) -> None:
 @pytest.mark.parametrize("name", ["bullet", "mujoco"])
 def test_the_batch_flies_as_the_engines_do(name: str, pilot: Callable[[np.ndarray], np.ndarray]) -> None:
     disturbances: dict[str, Any] = {
-        "payload": {"mass": {"uniform": [0.2, 0.4]}, "drop": 5.0},
+        "payload": {"mass": {"uniform": [0.2, 0.4]}, "detach_time": 5.0},
         "wind": {"uniform": [0.8, 1.2]},
         "ground_effect": 1.0,
         "push": [{"body": "rear_left", "magnitude": 2.0, "direction": [1, 1, 1], "start": 3.0017, "duration": 0.1}],
-        "mass_error": 1.05,
-        "torque_delay": 1,
-        "actuator_loss": [{"joint": "front_left", "factor": 0.95, "start": 6.0}],
+        "mass_scale": 1.05,
+        "action_delay": 1,
+        "actuator_effectiveness": [{"joint": "front_left", "factor": 0.95, "start": 6.0}],
         "initial_position": {"offset": [{"uniform": [-0.05, 0.05]}, 0.02, 0.0]},
     }
     engine, batch = (Flight(kind, disturbances, control_period=0.015) for kind in (name, "batch"))

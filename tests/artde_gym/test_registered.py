@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from artde_gym.disturbances import KINDS
+from artde_gym.disturbances import DISTURBANCES
 from artde_gym.errors import OptionError, StoreError
 from artde_gym.evaluation import Result, evaluate, register_metric
 from artde_gym.evaluation.registered import METRICS
@@ -35,7 +35,7 @@ def friction(values, states):
 
 def register():
     torque = Parameter("torque", "Nm", 0.0, 20.0, None, "largest torque of friction")
-    register_disturbance(Kind("rust", "Friction.", (torque,), requires="joints", scalar="torque"), friction)
+    register_disturbance(Kind("rust", "Friction.", (torque,), requires="joints", shorthand="torque"), friction)
     disturbances = {"rust": {"uniform": [0.1, 0.3]}}
     register_scenario(Scenario("rusty", "BipedWalk-Payload-v0", {"duration": 0.2}, disturbances, "rust"))
     register_metric("knee_speed", lambda fields, _: np.abs(fields["qd"][..., 3]), "max")
@@ -96,7 +96,7 @@ if __name__ == "__main__":
 
 @pytest.fixture(autouse=True)
 def clean(monkeypatch):
-    for registry in (KINDS, METRICS, SCENARIOS):
+    for registry in (DISTURBANCES, METRICS, SCENARIOS):
         len(registry)
         monkeypatch.setattr(registry, "_entries", dict(registry))
 
@@ -140,9 +140,9 @@ def test_metrics_are_those_of_the_whole_signal_in_single_and_batch(tmp_path):
     for reduction in ("mean", "rms", "max", "min"):
         register_metric(f"height_{reduction}", lambda fields, _: fields["base_height"][..., 0], reduction)
     register_metric("gain_mean", lambda _, inside: inside.get("c"))
-    options = {"episodes": 2, "env_kwargs": {"duration": 0.15, "engine": "mujoco"}, "trace_hz": np.inf}
-    single = evaluate(["tde", "artde"], WALK, out=tmp_path, traced=2, **options)
-    batch = evaluate(["tde", "artde"], WALK, backend="batch", **options)
+    options = {"episodes": 2, "env_kwargs": {"duration": 0.15, "engine": "mujoco"}, "record_hz": np.inf}
+    single = evaluate(["tde", "artde"], WALK, out=tmp_path, record_episodes=2, **options)
+    batch = evaluate(["tde", "artde"], WALK, vectorized=True, **options)
     pd.testing.assert_frame_equal(single.episodes.filter(like="height_"), batch.episodes.filter(like="height_"))
     assert single.episodes.groupby("controller")["gain_mean"].count().to_dict() == {"artde": 2, "tde": 0}
     heights = np.load(tmp_path / "traces" / "custom" / "artde-1.npz")["base_height"][:, 0].astype(float)

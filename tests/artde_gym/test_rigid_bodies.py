@@ -11,7 +11,15 @@ from scipy.spatial.transform import Rotation
 
 from artde_gym.robots.q450.model import INERTIA, MASS, PAYLOAD_PLACE, q450
 from artde_gym.sim.factory import EngineName, make_engine
-from artde_gym.sim.rigid_bodies import MassProperties, RigidBodies, composite, cross, times, transposed_times, turned
+from artde_gym.sim.rigid_bodies import (
+    MassProperties,
+    RigidBodies,
+    composite,
+    cross,
+    rotate_frames,
+    times,
+    transposed_times,
+)
 from artde_gym.sim.rotation import matrix
 
 G = 9.81
@@ -97,7 +105,7 @@ def test_turning_by_small_vectors() -> None:
     rng = np.random.default_rng(0)
     rot, vectors = Rotation.from_quat(rng.normal(size=(6, 4))), rng.normal(0.0, 0.01, (6, 3))
     expected = (rot * Rotation.from_rotvec(vectors)).as_matrix()
-    got = turned(np.moveaxis(rot.as_matrix(), 0, -1), vectors.T)
+    got = rotate_frames(np.moveaxis(rot.as_matrix(), 0, -1), vectors.T)
     np.testing.assert_allclose(np.moveaxis(got, -1, 0), expected, rtol=0, atol=1e-5)
     np.testing.assert_allclose(np.einsum("ijn,ikn->jkn", got, got), np.eye(3)[..., None].repeat(6, -1), atol=1e-14)
 
@@ -127,21 +135,21 @@ def test_tumbling_is_of_second_order(properties: MassProperties) -> None:
 def test_engines_tumble_likewise(loaded: bool, engine_name: EngineName) -> None:
     engine = make_engine(engine_name, q450(), 0.001)
     engine.set_gravity((0.0, 0.0, 0.0))
-    engine.place((0.0, 0.0, 5.0), np.zeros(0))
+    engine.reset((0.0, 0.0, 5.0), np.zeros(0))
     if loaded:
         engine.attach_payload(BALL.mass, BALL.com)
     torque = np.diag(INERTIA) @ SPIN
     for _ in range(1000):
-        engine.push_base((0.0, 0.0, 0.0), tuple(torque.tolist()))
+        engine.apply_base_wrench((0.0, 0.0, 0.0), tuple(torque.tolist()))
         engine.step(np.zeros(0))
-    state = engine.read()
+    state = engine.state()
     rot = Rotation.from_quat(state.quat_xyzw)
     rates = rot.inv().apply(state.angular_velocity)
     assert np.linalg.norm(rates) > 2.0
     for _ in range(500):
         engine.step(np.zeros(0))
     expected_rot, expected_rates = tumble(BOTH if loaded else BARE, rates, rot.as_matrix(), 0.5)
-    state = engine.read()
+    state = engine.state()
     rot = Rotation.from_quat(state.quat_xyzw)
     np.testing.assert_allclose(rot.as_matrix(), expected_rot, rtol=0, atol=0.01)
     np.testing.assert_allclose(rot.inv().apply(state.angular_velocity), expected_rates, rtol=0, atol=0.02)
@@ -160,7 +168,7 @@ def test_free_fall_is_exact() -> None:
 def test_energy_and_momentum_are_kept_without_forces() -> None:
     bodies = bodies_of(BOTH)
     bodies.rates[:, 0] = SPIN
-    weight = np.array([[0.0], [0.0], [BOTH.mass * G]])  # at the centre of mass: gravity is all that is taken away
+    weight = np.array([[0.0], [0.0], [BOTH.mass * G]])  # at the center of mass: gravity is all that is taken away
 
     def energy() -> float:
         return float(0.5 * bodies.rates[:, 0] @ BOTH.inertia @ bodies.rates[:, 0])
@@ -189,7 +197,7 @@ def test_an_off_centre_force_turns_the_body_by_its_moment() -> None:
     np.testing.assert_allclose(bodies.com_velocity[:, 0], 1e-4 * (force / BOTH.mass - [0, 0, G]), rtol=1e-6)
 
 
-@pytest.mark.parametrize(("before", "after"), [(BOTH, BARE), (BARE, BOTH)], ids=["drop", "attach"])
+@pytest.mark.parametrize(("before", "after"), [(BOTH, BARE), (BARE, BOTH)], ids=["drop", "attach_time"])
 def test_dropping_and_attaching_keep_momentum_and_the_motion_of_the_vehicle(
     before: MassProperties, after: MassProperties
 ) -> None:

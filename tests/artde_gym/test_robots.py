@@ -19,7 +19,7 @@ from artde_gym.robots.ojas.leg_ik import leg_angles
 from artde_gym.robots.ojas.model import ojas
 from artde_gym.robots.ojas.walking import walking_pattern
 from artde_gym.sim.factory import make_engine
-from controllers.laws.validity import tde_eigenvalues, tde_is_valid
+from controllers.laws.stability import tde_eigenvalues, tde_is_valid
 
 SPECS = {
     f"{kind}-{arms}": ojas(kind, arms=arms) for kind in ("rotor", "lumped", "none") for arms in ("fixed", "revolute")
@@ -247,7 +247,7 @@ def test_feet_out_of_reach_are_refused(ankle, thigh, shank):
 @pytest.mark.bullet
 @pytest.mark.parametrize("name", ["rotor-fixed-links", "rotor-revolute-links", "lumped-fixed", "none-revolute"])
 def test_bullet_has_exactly_the_inertias_of_the_spec(name):
-    from artde_gym.sim.quiet import bullet
+    from artde_gym.sim.pybullet_module import bullet
 
     spec = SPECS[name]
     engine: Any = make_engine("bullet", spec, 0.001)
@@ -271,10 +271,10 @@ def test_momentum_of_a_fall(engine_name, name):
     engine, tau = make_engine(engine_name, SPECS[name], 1e-3), np.zeros(12)
     tree = RigidBodyTree(engine.spec)
     tau[[0, 9]] = 0.5, -0.5
-    engine.place((0.0, 0.0, 3.0), standing())
+    engine.reset((0.0, 0.0, 3.0), standing())
     for _ in range(100):
         engine.step(tau)
-    state = engine.read()
+    state = engine.state()
     engine.close()
     rot = Rotation.from_quat(state.quat_xyzw).as_matrix()
     velocity = np.concatenate([state.velocity, state.angular_velocity, state.qd])
@@ -288,9 +288,9 @@ def test_first_step_of_a_fall(engine_name, name):
     q = walking_pattern(0.1, 1.0, 4.5, 0.001).q[0]
     tau = np.random.default_rng(13).normal(size=12)
     engine = make_engine(engine_name, spec, 1e-3)
-    engine.place((0.0, 0.0, 3.0), q)
+    engine.reset((0.0, 0.0, 3.0), q)
     engine.step(tau)
-    measured = engine.read()
+    measured = engine.state()
     engine.close()
 
     def predicted(tree: RigidBodyTree) -> np.ndarray:
@@ -311,7 +311,7 @@ MIRROR = np.array([-1, -1, 1, 1, 1, -1])  # of q1..q6: yaw and roll change their
 
 
 def standing() -> np.ndarray:
-    """A symmetric pose with bent knees and the centre of mass over the middle of the feet."""
+    """A symmetric pose with bent knees and the center of mass over the middle of the feet."""
     return walking_pattern(0.1, 1.0, 4.5, 0.001).q[0]
 
 

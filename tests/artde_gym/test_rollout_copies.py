@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import controllers
-from artde_gym.evaluation.batch import run_batch
 from artde_gym.evaluation.environments import vector
 from artde_gym.evaluation.rollout import Episode, run_episode
+from artde_gym.evaluation.vector_rollout import run_vector
 
 SHORT: dict[str, Any] = {"duration": 0.3}
 QUADROTOR = "QuadInfinity-Payload-v0"
@@ -77,8 +77,8 @@ def test_many_episodes() -> None:
     env = vector(QUADROTOR, json.dumps(SHORT), 3)
     policy = controllers.make("artde", env)
     for one, other in zip(
-        run_batch(env, Flatterer(policy), [1, 2, 3], traced=2),
-        run_batch(env, policy, [1, 2, 3], traced=2),
+        run_vector(env, Flatterer(policy), [1, 2, 3], record_episodes=2),
+        run_vector(env, policy, [1, 2, 3], record_episodes=2),
         strict=True,
     ):
         equal(one, other)

@@ -60,8 +60,8 @@ def test_heights_of_the_rotors_of_a_tilted_vehicle() -> None:
 
 @pytest.mark.parametrize("constant", [0.035, 0.2, 0.002])
 def test_lag_is_exact(constant: float) -> None:
-    realised = {} if constant == q450.ROTOR_LAG else {"motor_lag": {"time_constant": constant}}
-    rotors = Rotors(realised, HOVER, STEP, STEPS)
+    sampled = {} if constant == q450.ROTOR_LAG else {"motor_lag": {"time_constant": constant}}
+    rotors = Rotors(sampled, HOVER, STEP, STEPS)
     start = np.array(HOVER)
     for period, wrench in enumerate(([20.0, 0.1, -0.2, 0.01], [10.0, 0.0, 0.0, 0.0])):
         target = q450.ALLOCATION @ wrench
@@ -87,7 +87,7 @@ def test_each_rotor_is_limited_by_itself() -> None:
 
 
 def test_commands_come_late_by_whole_periods() -> None:
-    rotors = Rotors({"torque_delay": {"samples": 2}, "motor_lag": {"time_constant": 0.0}}, HOVER, STEP, STEPS)
+    rotors = Rotors({"action_delay": {"steps": 2}, "motor_lag": {"time_constant": 0.0}}, HOVER, STEP, STEPS)
     wrenches = [[10.0 + period, 0.0, 0.0, 0.0] for period in range(5)]
     got = [rotors.advance(wrench, period * STEPS)[0].sum() for period, wrench in enumerate(wrenches)]
     np.testing.assert_allclose(got, [sum(HOVER), sum(HOVER), 10.0, 11.0, 12.0])
@@ -100,7 +100,7 @@ def test_losses_begin_at_their_time_and_multiply(start: float) -> None:
         {"joint": "rear_left", "factor": 0.5, "start": 0.025},
         {"joint": "front_right", "factor": 0.0, "start": start},
     ]
-    rotors = Rotors({"actuator_loss": losses}, HOVER, STEP, STEPS)
+    rotors = Rotors({"actuator_effectiveness": losses}, HOVER, STEP, STEPS)
     wrench = [16.0, 0.0, 0.0, 0.0]
     means = np.concatenate([rotors.advance(wrench, 0), rotors.advance(wrench, STEPS)])
     value = np.array(HOVER)

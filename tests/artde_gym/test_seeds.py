@@ -39,10 +39,16 @@ def mixed(episodes: int = 6) -> tuple[int, list[int]]:
     raise AssertionError("half of all seeds are large")
 
 
-@pytest.mark.parametrize("backend", ["single", "batch"])
-def test_seeds_survive_a_folder_and_all_its_formats(tmp_path: Path, backend: Any) -> None:
+@pytest.mark.parametrize("vectorized", [False, True])
+def test_seeds_survive_a_folder_and_all_its_formats(tmp_path: Path, vectorized: bool) -> None:
     seed, seeds = mixed()
-    common: dict[str, Any] = {"env_kwargs": SHORT, "seed": seed, "out": tmp_path, "backend": backend, "traced": 0}
+    common: dict[str, Any] = {
+        "env_kwargs": SHORT,
+        "seed": seed,
+        "out": tmp_path,
+        "vectorized": vectorized,
+        "record_episodes": 0,
+    }
     found = evaluate(["tde"], QUADROTOR, episodes=len(seeds), **common).episodes
     assert found["seed"].tolist() == seeds
     _, stored = read_episodes(tmp_path)
@@ -71,7 +77,7 @@ def test_seeds_survive_parquet(tmp_path: Path) -> None:
 
 
 def test_a_row_of_another_seed_is_refused(tmp_path: Path) -> None:
-    call: dict[str, Any] = {"env_kwargs": SHORT, "out": tmp_path, "traced": 0}
+    call: dict[str, Any] = {"env_kwargs": SHORT, "out": tmp_path, "record_episodes": 0}
     evaluate(["tde"], QUADROTOR, episodes=1, **call)
     table = tmp_path / "episodes.csv"
     table.write_text(table.read_text().replace(str(episode_seed(0, 0)), "7"))

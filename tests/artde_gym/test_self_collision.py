@@ -18,12 +18,12 @@ def test_feet_stop_each_other_only_if_the_spec_says_so(engine):
         world = make_engine(engine, spec, 0.001)
         world.set_friction(0.8)
         world.set_gravity((0.0, 0.0, 0.0))
-        world.place((0.0, 0.0, 2.0), np.zeros(12))
+        world.reset((0.0, 0.0, 2.0), np.zeros(12))
         inward = np.zeros(12)
         inward[1], inward[7] = -1.0, 1.0
         for _ in range(800):
             world.step(inward)
-        ends.append(world.read().q)
+        ends.append(world.state().q)
         world.close()
     apart, together = ends[1][1] - ends[1][7], ends[0][1] - ends[0][7]
     assert together < -1.0  # passed through each other

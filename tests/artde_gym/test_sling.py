@@ -38,7 +38,7 @@ def fields(observation: np.ndarray) -> dict[str, np.ndarray]:
 
 def test_the_load_hangs_at_rest_until_it_is_pushed_and_released(engine_name: EngineName) -> None:
     push = {"body": "payload", "magnitude": 2.0, "start": 0.3}
-    env = single(engine=engine_name, disturbances={"payload": {**HELD["payload"], "drop": 0.9}, "push": push})
+    env = single(engine=engine_name, disturbances={"payload": {**HELD["payload"], "detach_time": 0.9}, "push": push})
     observation, info = env.reset(seed=0)
     assert fields(observation)["cable"].tolist() == pytest.approx([0.0, 0.0, -0.6])
     assert info["load_hangs"] is True
@@ -95,7 +95,11 @@ def test_a_load_on_the_ground_ends_the_flight(engine_name: EngineName) -> None:
 
 
 VARIED: dict[str, Any] = {
-    "payload": {"mass": {"uniform": [0.1, 0.5]}, "cable": {"choice": [0.0, 0.3, 1.0]}, "drop": {"uniform": [0.3, 0.7]}},
+    "payload": {
+        "mass": {"uniform": [0.1, 0.5]},
+        "cable": {"choice": [0.0, 0.3, 1.0]},
+        "detach_time": {"uniform": [0.3, 0.7]},
+    },
     "push": {"body": "payload", "magnitude": {"uniform": [0.0, 4.0]}, "direction": [1, 1, 0], "start": 0.1},
     "wind": {"choice": [0.0, 2.0]},
     "sensor_noise": {"position": {"choice": [0.0, 0.002]}, "velocity": 0.01},
@@ -152,7 +156,7 @@ def test_a_delayed_cable_is_that_of_some_samples_ago() -> None:
 
 def test_noise_disturbs_a_cable_that_is_held() -> None:
     quiet, noisy = (
-        vector(3, disturbances={"payload": {**HELD["payload"], "drop": 0.1}, **extra})
+        vector(3, disturbances={"payload": {**HELD["payload"], "detach_time": 0.1}, **extra})
         for extra in ({}, {"sensor_noise": {"position": 0.01, "velocity": 0.1}})
     )
     a, b = quiet.reset(seed=0)[0], noisy.reset(seed=0)[0]
@@ -179,9 +183,9 @@ def test_a_frontier_of_this_environment_is_its_own() -> None:
 
 
 def test_what_is_watched_is_measured_alike_one_by_one_and_many_at_once() -> None:
-    def run(backend: Any, **kwargs: Any) -> Any:
+    def run(vectorized: bool, **kwargs: Any) -> Any:
         disturbances = {
-            "payload": {**HELD["payload"], "drop": 1.5},
+            "payload": {**HELD["payload"], "detach_time": 1.5},
             "push": {"body": "payload", "magnitude": 1.4, "start": 0.2},
         }
         return evaluate(
@@ -189,7 +193,7 @@ def test_what_is_watched_is_measured_alike_one_by_one_and_many_at_once() -> None
             ID,
             disturbances=disturbances,
             episodes=1,
-            backend=backend,
+            vectorized=vectorized,
             env_kwargs={"duration": 1.8, **kwargs},
         ).episodes.iloc[0]
 
@@ -210,7 +214,7 @@ def test_a_swing_that_ends_before_it_settles_never_settled() -> None:
     """The load swings by 10 degrees and is let go (NaN), or calms down to 1 degree first."""
     n, period = 400, 0.015
     events = [{"push0": (1.0, 1.2)}] * 2
-    metrics = Metrics(sling.TRACKING, LAYOUT, period, [1.0, 1.0], events)
+    metrics = Metrics(sling.METRICS_SPEC, LAYOUT, period, [1.0, 1.0], events)
     swing = np.full((n, 2), np.radians(10.0))
     swing[200:, 1] = np.radians(1.0)
     hangs = np.ones((n, 2), bool)
@@ -246,7 +250,7 @@ def test_scenarios_fly(name: str) -> None:
 def test_engines_fly_as_the_vector_does_for_45_seconds(engine_name: EngineName) -> None:
     """Kick and release included; under the swing term, which damps what would make them part."""
     given = {
-        "payload": {"mass": 0.35, "cable": 0.5, "drop": 35.0},
+        "payload": {"mass": 0.35, "cable": 0.5, "detach_time": 35.0},
         "push": {"body": "payload", "magnitude": 1.4, "direction": [1, 1, 0], "start": 20.0},
     }
 

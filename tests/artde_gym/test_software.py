@@ -27,7 +27,7 @@ FLIGHT: dict[str, Any] = {"duration": 0.3}
 
 def evaluated(folder: Path, **options: Any) -> Any:
     return evaluate(
-        ["tde", "tde+ppo"], QUADROTOR, disturbances={}, env_kwargs=FLIGHT, backend="batch", episodes=1, out=folder,
+        ["tde", "tde+ppo"], QUADROTOR, disturbances={}, env_kwargs=FLIGHT, vectorized=True, episodes=1, out=folder,
         **options,
     )  # fmt: skip
 
@@ -35,19 +35,19 @@ def evaluated(folder: Path, **options: Any) -> Any:
 def searched(folder: Path, **options: Any) -> Any:
     return frontier(
         ["tde"], QUADROTOR, "wind.scale", low=0, high=1, tolerance=1, episodes=1, env_kwargs=FLIGHT,
-        disturbances={"wind": 1.0}, out=folder, backend="batch", **options,
+        disturbances={"wind": 1.0}, out=folder, vectorized=True, **options,
     )  # fmt: skip
 
 
 def tuned(folder: Path, **options: Any) -> Any:
     return tune(
-        ["tde"], QUADROTOR, trials=1, episodes=1, held_out=1, env_kwargs=FLIGHT, out=folder, backend="batch", **options
+        ["tde"], QUADROTOR, trials=1, episodes=1, held_out=1, env_kwargs=FLIGHT, out=folder, vectorized=True, **options
     )
 
 
 def swept(folder: Path, **options: Any) -> Any:
     pytest.importorskip("pyarrow")
-    given = {"env": QUADROTOR, "controller": "tde+ppo", "disturbances": {}, "env_kwargs": FLIGHT, "backend": "batch"}
+    given = {"env": QUADROTOR, "controller": "tde+ppo", "disturbances": {}, "env_kwargs": FLIGHT, "vectorized": True}
     return sweep(given, folder, **options)
 
 

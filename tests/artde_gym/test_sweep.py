@@ -56,12 +56,12 @@ def whole(tmp_path_factory) -> pd.DataFrame:
         ),
         ({"env": "BipedPush-v0"}, {"env_id": "BipedPush-v0"}),  # its own disturbances
         ({"scenario": "Q1", "disturbances": {"wind": 2.0}}, {"scenario": "Q1", "disturbances": {"wind": 2.0}}),
-        ({"scenario": "Q1", "backend": "batch"}, {"scenario": "Q1", "backend": "batch"}),
+        ({"scenario": "Q1", "vectorized": True}, {"scenario": "Q1", "vectorized": True}),
     ],
     ids=["scenario", "gains", "environment", "disturbances", "batch"],
 )
 def test_its_episodes_are_those_of_evaluate_bit_for_bit(tmp_path, given, arguments):
-    kwargs = {"duration": 0.3} if "backend" in given else {"duration": 0.3, "engine": "mujoco"}
+    kwargs = {"duration": 0.3} if "vectorized" in given else {"duration": 0.3, "engine": "mujoco"}
     mine = sweep({"controller": "artde", "env_kwargs": kwargs, "seed": 5, "episodes": 3, **given}, tmp_path).episodes
     theirs = evaluate(["artde"], env_kwargs=kwargs, seed=5, episodes=3, **arguments).episodes
     assert set(mine) - set(theirs) <= {"cell", "disturbances"} | {name for name in mine if "s." in name}

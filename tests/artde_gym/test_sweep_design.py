@@ -104,7 +104,7 @@ def test_draws_follow_their_distribution(distribution, holds):
         ("disturbances", {"wind": 1.0}),
         ("env_kwargs", {"duration": 3.0}),
         ("seed", 1),
-        ("backend", "batch"),
+        ("vectorized", "batch"),
     ],
 )
 def test_whatever_decides_about_an_episode_decides_about_its_cell(name, value):
@@ -124,7 +124,7 @@ def test_whatever_decides_about_an_episode_decides_about_its_cell(name, value):
         ({"episodes": 0}, OptionError, ["episodes", "0"]),
         ({"episodes": True}, OptionError, ["episodes", "True"]),
         ({"seed": -1}, OptionError, ["seed", "-1"]),
-        ({"backend": "both"}, OptionError, ["backend", "both"]),
+        ({"vectorized": "both"}, OptionError, ["vectorized", "both"]),
         ({"gains": {"atde": {"k_p": 1.0}}}, UnknownNameError, ["gains", "atde"]),
         ({"gains": {"tde": 3}}, OptionError, ["gains", "mapping"]),
         ({"disturbances": 3}, OptionError, ["disturbances", "3"]),

@@ -51,7 +51,7 @@ LABELS = {
     "disturbance.payload.mass": 1.25,
     "disturbance.push.0.magnitude": 17.0,
     "disturbance.friction.coefficient": 0.55,
-    "disturbance.actuator_loss.joint": "left_hip",
+    "disturbance.actuator_effectiveness.joint": "left_hip",
 }
 
 

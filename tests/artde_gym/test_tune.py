@@ -18,7 +18,7 @@ from artde_gym import registration
 from artde_gym.cli import app
 from artde_gym.errors import ArtdeGymError, DisturbanceError, OptionError, StoreError, UnknownNameError
 from artde_gym.evaluation import evaluate
-from artde_gym.registration import GainRange, registered_controllers, search_space
+from artde_gym.registration import GainRange, registered_controllers, tuning_space
 from artde_gym.studies import Tuning, tune
 
 QUADROTOR = "QuadInfinity-Payload-v0"
@@ -46,7 +46,7 @@ def lift(tmp_path, monkeypatch):
     )
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(registration, "_controllers", registered_controllers())
-    artde_gym.register_controller("lift", "lifting:Lift", search="lifting:search_space")
+    artde_gym.register_controller("lift", "lifting:Lift", tuning_space="lifting:tuning_space")
 
 
 def test_finds_the_gain_that_flies_where_the_preset_falls(lift):
@@ -73,8 +73,8 @@ def test_every_controller_gets_the_same_budget_and_its_preset_first():
     assert found.trials["trial"].tolist() == [0, 0, 1, 1, 2, 2]
     with gym.make(QUADROTOR) as env:
         for name in names:
-            space, tried = search_space(name, env), gains_of(found, name)
-            assert tried[0] == {gain: where.start for gain, where in space.items()}
+            space, tried = tuning_space(name, env), gains_of(found, name)
+            assert tried[0] == {gain: where.initial for gain, where in space.items()}
             assert tried[0] != tried[1] != tried[2]
             assert all(space[gain].low <= value <= space[gain].high for one in tried for gain, value in one.items())
             costs = [row["cost"] for row in found.trials.to_dict(orient="records") if row["controller"] == name]
@@ -146,7 +146,7 @@ def test_the_biped_is_tuned_too():
         (["tde"], {"disturbances": {"wind": -1}}, DisturbanceError, "wind"),
         (["tde"], {"disturbances": {"wind": {1}}}, ArtdeGymError, "JSON"),
         (["tde"], {"scenario": "S1"}, OptionError, "S1"),
-        (["tde"], {"backend": "both"}, OptionError, "'both'"),
+        (["tde"], {"vectorized": "both"}, OptionError, "'both'"),
     ],
 )
 def test_refusals_come_before_the_first_trial_and_leave_no_folder(tmp_path, names, options, error, words):
@@ -161,7 +161,7 @@ def test_a_controller_without_ranges_says_so(monkeypatch):
     with pytest.raises(UnknownNameError, match=r"to be tuned is 'mine'.*artde.*tde"):
         tune(["mine"], QUADROTOR, **SHORT)
     with pytest.raises(UnknownNameError, match="search"):
-        artde_gym.register_controller("mine", "somewhere:make", search="nowhere")
+        artde_gym.register_controller("mine", "somewhere:make", tuning_space="nowhere")
 
 
 @pytest.mark.parametrize("env_id", [QUADROTOR, BIPED])
@@ -170,14 +170,14 @@ def test_every_range_holds_its_preset(env_id):
         spaces = {}
         for name in registered_controllers():
             try:
-                spaces[name] = search_space(name, env)
+                spaces[name] = tuning_space(name, env)
             except UnknownNameError:
                 continue
         assert {"tde", "atde", "artde", "artde-robust", "pid"} <= spaces.keys()
         for space in spaces.values():
             for where in space.values():
                 assert isinstance(where, GainRange)
-                assert 0 < where.low <= where.start <= where.high
+                assert 0 < where.low <= where.initial <= where.high
 
 
 def test_without_optuna_the_extra_is_named(monkeypatch):

@@ -53,7 +53,7 @@ def test_tune_refuses_a_controller_named_twice() -> None:
         ("gains.tde.m_bar", [[1, 2, 3], [1.0, 2.0, 3.0]]),
         ("env_kwargs.control_period", [0.004, 4e-3]),
         ("env_kwargs.duration", [58, 58.0]),
-        ("disturbances.payload", [1, 1.0, {"mass": 1}, {"mass": 1.0, "attach": 0}]),
+        ("disturbances.payload", [1, 1.0, {"mass": 1}, {"mass": 1.0, "attach_time": 0}]),
         ("disturbances.payload", [{"uniform": [1, 2]}, {"mass": {"uniform": [1.0, 2.0]}}]),
         ("disturbances.friction", [0.8, {"coefficient": 0.8}]),
         ("disturbances", [{"payload": 1}, {"payload": {"mass": 1}}, {"payload": 1, "push": []}]),
@@ -75,7 +75,7 @@ def test_a_default_that_is_spelled_out_is_the_case_without_it() -> None:
         ("gains.tde.k_p", [100, 100.5]),
         ("env_kwargs.self_collision", [True, 1]),
         ("env_kwargs.self_collision", [False, 0]),
-        ("disturbances.payload", [1, {"mass": 1, "drop": 5}]),
+        ("disturbances.payload", [1, {"mass": 1, "detach_time": 5}]),
         ("disturbances.payload", [1, {"uniform": [1, 1]}]),
     ],
 )

@@ -20,11 +20,11 @@ import controllers
 from artde_gym.cli import app
 from artde_gym.errors import OptionError, UnknownNameError
 from artde_gym.evaluation import evaluate
-from artde_gym.palette import LOOKS
+from artde_gym.palette import STYLES
 from artde_gym.registration import registered_controllers
 from artde_gym.video import video
-from artde_gym.video.frames import Shot, shots
-from artde_gym.video.tiles import FALLEN, panels
+from artde_gym.video.frames import Frame, render_frames
+from artde_gym.video.tiles import FALLEN, tile_frames
 from artde_gym.video.writer import durations, frame_rate, write
 
 WALK, FLYER = "BipedWalk-Payload-v0", "QuadInfinity-Payload-v0"
@@ -59,8 +59,8 @@ def decoded(path: Path) -> dict[str, Any]:
     return json.loads(subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout)
 
 
-def near(picture: np.ndarray, colour: str | tuple[int, ...], tolerance: int = 30) -> np.ndarray:
-    wanted = [int(colour[i : i + 2], 16) for i in (1, 3, 5)] if isinstance(colour, str) else colour
+def near(picture: np.ndarray, color: str | tuple[int, ...], tolerance: int = 30) -> np.ndarray:
+    wanted = [int(color[i : i + 2], 16) for i in (1, 3, 5)] if isinstance(color, str) else color
     return np.abs(picture.astype(int) - wanted).max(axis=-1) < tolerance
 
 
@@ -69,11 +69,11 @@ def test_shots_are_of_the_episode_that_evaluate_runs() -> None:
     row = evaluate(["tde"], WALK, episodes=1, seed=5, **FALL).episodes.iloc[0]
     kwargs = {**FALL["env_kwargs"], "disturbances": FALL["disturbances"]}
     spec = registered_controllers()["tde"]
-    seen = list(shots(WALK, kwargs, spec, {}, int(row["seed"]), [0.0, 0.1, 0.25, 9.0, 10.0], 64))
-    assert [shot.time_s for shot in seen] == pytest.approx([0.0, 0.1, 0.252, row["time_to_fall_s"]])
-    assert [shot.over for shot in seen] == [False, False, False, True]
+    seen = list(render_frames(WALK, kwargs, spec, {}, int(row["seed"]), [0.0, 0.1, 0.25, 9.0, 10.0], 64))
+    assert [frame.time_s for frame in seen] == pytest.approx([0.0, 0.1, 0.252, row["time_to_fall_s"]])
+    assert [frame.over for frame in seen] == [False, False, False, True]
     assert seen[-1].fall_reason == row["fall_reason"]
-    assert all(shot.picture.shape == (48, 64, 3) for shot in seen)
+    assert all(frame.picture.shape == (48, 64, 3) for frame in seen)
 
 
 @pytest.mark.parametrize("suffix", [".gif", ".webp"])
@@ -86,7 +86,7 @@ def test_two_controllers_side_by_side_with_their_fall(tmp_path: Path, suffix: st
     assert height % 2 == 0
     for number, name in enumerate(("tde", "artde")):
         part = np.s_[20:42, number * 164 : number * 164 + 80]
-        assert near(first[part], LOOKS[name].colour, 60).sum() > 10
+        assert near(first[part], STYLES[name].color, 60).sum() > 10
         panel = np.s_[45:, number * 164 : number * 164 + 160]
         assert near(last[panel], FALLEN).sum() > 300  # its frame
         assert not near(first[panel], FALLEN).sum() > 10
@@ -118,9 +118,9 @@ def test_png_is_one_picture_and_the_same_each_time(tmp_path: Path) -> None:
 
 
 def test_panels_freeze_who_has_ended_and_fill_rows() -> None:
-    grey, red = np.full((60, 80, 3), 128, np.uint8), np.full((60, 80, 3), (220, 40, 40), np.uint8)
-    walks, fell = Shot(1.5, grey, False, ""), Shot(1.25, red, True, "tilt")
-    page = panels({"tde": fell, "atde": walks, "artde": walks}, "title", 2)
+    gray, red = np.full((60, 80, 3), 128, np.uint8), np.full((60, 80, 3), (220, 40, 40), np.uint8)
+    walks, fell = Frame(1.5, gray, False, ""), Frame(1.25, red, True, "tilt")
+    page = tile_frames({"tde": fell, "atde": walks, "artde": walks}, "title", 2)
     assert page.shape[0] % 2 == page.shape[1] % 2 == 0
     assert page.shape[1] == 164
     panel = page[20 + 20 :][:60, :80]

@@ -19,7 +19,7 @@ from artde_gym.errors import ArtdeGymError, OptionError
 from baselines import run as run_module
 from baselines.errors import TrainingError
 from baselines.options import OPTIONS
-from baselines.recipe import Recipe
+from baselines.residual_config import ResidualConfig
 from baselines.run import Training
 from baselines.train import train
 from controllers import GainError
@@ -29,7 +29,7 @@ SHORT = {"duration": 0.3}
 
 
 def training(env: str = QUADROTOR, base: str = "tde", **more: Any) -> Training:
-    recipe = Recipe("q450" if env == QUADROTOR else "ojas", base)
+    recipe = ResidualConfig("q450" if env == QUADROTOR else "ojas", base)
     return Training(env, recipe, **{"envs": 2, "steps": 16, "env_kwargs": SHORT, **more})
 
 
@@ -87,14 +87,14 @@ def test_the_options_are_arguments_of_the_algorithm(algo: str) -> None:
 @pytest.mark.parametrize(
     "field",
     [
-        {"robot": ["q450"]}, {"base": 3}, {"gains": [1]}, {"gains": {1: 1}}, {"channel": "x"}, {"channel": 0},
-        {"channel": []}, {"hold": False}, {"hold": 1e9}, {"hold": "0.015"}, {"hold": None}, {"limit": float("nan")},
-        {"limit": -1.0}, {"limit": []}, {"gated": "no"}, {"gated": 1},
+        {"robot": ["q450"]}, {"base": 3}, {"gains": [1]}, {"gains": {1: 1}}, {"action_mode": "x"}, {"action_mode": 0},
+        {"action_mode": []}, {"decision_period": False}, {"decision_period": 1e9}, {"decision_period": "0.015"}, {"decision_period": None}, {"action_scale": float("nan")},
+        {"action_scale": -1.0}, {"action_scale": []}, {"gated": "no"}, {"gated": 1},
     ],
 )  # fmt: skip
 def test_fields_of_a_recipe_are_checked_at_construction(field: dict[str, Any]) -> None:
     with pytest.raises(OptionError, match=next(iter(field))):
-        Recipe(**{"robot": "q450", **field})
+        ResidualConfig(**{"robot": "q450", **field})
 
 
 def test_a_disk_that_is_full_leaves_no_empty_record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,11 +115,11 @@ def test_a_disk_that_is_full_leaves_no_empty_record(tmp_path: Path, monkeypatch:
     [
         ["--options", '{"gamma": NaN}'],
         ["--options", "words"],
-        ["--channel", "x"],
+        ["--action-mode", "x"],
         ["--base", "nope"],
         ["--env-kwargs", '{"nope": 1}'],
         ["--seed", "-1"],
-        ["--limit", "nan"],
+        ["--action-scale", "nan"],
     ],
 )
 def test_a_mistake_is_one_line(arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

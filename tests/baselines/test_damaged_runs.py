@@ -81,9 +81,9 @@ def test_a_recipe_cannot_lead_elsewhere(recipe: dict[str, Any], tmp_path: Path) 
 
 FIELDS: list[tuple[str, Any]] = [
     ("version", True), ("version", 1.0), ("name", 3), ("name", "../../outside"), ("recipe", []),
-    ("recipe: hold", 1e9), ("recipe: hold", "0.015"), ("recipe: hold", False), ("recipe: hold", None),
-    ("recipe: limit", float("nan")), ("recipe: limit", -1), ("recipe: gated", "no"), ("recipe: channel", "x"),
-    ("recipe: channel", 0), ("recipe: base", None), ("recipe: gains", []), ("recipe: robot", ["q450"]),
+    ("recipe: decision_period", 1e9), ("recipe: decision_period", "0.015"), ("recipe: decision_period", False), ("recipe: decision_period", None),
+    ("recipe: action_scale", float("nan")), ("recipe: action_scale", -1), ("recipe: gated", "no"), ("recipe: action_mode", "x"),
+    ("recipe: action_mode", 0), ("recipe: base", None), ("recipe: gains", []), ("recipe: robot", ["q450"]),
     ("recipe: unknown", 1), ("network", 3), ("network: sizes", [54]), ("network: sizes", []),
     ("network: sizes", [54, 0, 3]), ("network: sizes", [54.0, 64, 64, 3]), ("network: sizes", {"54": 3}),
     ("network: squashed", "no"), ("network: squashed", 1), ("network: squashed", None), ("network: activation", "relu"),
@@ -132,7 +132,7 @@ def test_a_damaged_run_is_continued_or_refused(tmp_path: Path, monkeypatch: pyte
     import torch
 
     from baselines.agent import AGENTS
-    from baselines.recipe import Recipe
+    from baselines.residual_config import ResidualConfig
     from baselines.run import Training
     from baselines.train import train
 
@@ -140,7 +140,7 @@ def test_a_damaged_run_is_continued_or_refused(tmp_path: Path, monkeypatch: pyte
     tasks = AGENTS["q450"].tasks
     monkeypatch.setitem(tasks, name, dataclasses.replace(tasks[name], rollouts=2, episodes=1))
     training = Training(
-        name, Recipe("q450"), steps=64, envs=4, test_every=1, env_kwargs={"duration": 1.0},
+        name, ResidualConfig("q450"), steps=64, envs=4, test_every=1, env_kwargs={"duration": 1.0},
         options={"n_steps": 8, "batch_size": 16},
     )  # fmt: skip
     train(training, tmp_path / "whole")

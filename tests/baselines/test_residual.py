@@ -16,11 +16,11 @@ from artde_gym.robots.ojas.task import OBSERVATION
 from artde_gym.robots.q450.task import ACTION
 from baselines import legs, ojas
 from baselines.network import Network
-from baselines.recipe import Recipe
 from baselines.residual import Residual, ResidualPolicy
+from baselines.residual_config import ResidualConfig
 from baselines.residual_env import ResidualEnv
 from controllers.laws.tde import tde
-from controllers.policies import Plant
+from controllers.policies import ControlInterface
 
 BIPED = {
     "duration": 3.0,
@@ -51,8 +51,8 @@ def make(env_id: str, **more: Any) -> Any:
     return gym.make(env_id, disable_env_checker=True, **{**kwargs, **more})
 
 
-def recipe(env_id: str, **more) -> Recipe:
-    return Recipe(ENVIRONMENTS[env_id][0], **more)
+def recipe(env_id: str, **more) -> ResidualConfig:
+    return ResidualConfig(ENVIRONMENTS[env_id][0], **more)
 
 
 @pytest.mark.parametrize(("env_id", "base"), CASES)
@@ -81,7 +81,7 @@ def test_a_residual_is_du_of_the_law():
     signals = policy.read(observation)
     memory, du = policy.start(signals), rng.normal(size=12)
     expected, _ = tde(policy.gains, memory, signals, policy._period, du)
-    found, _ = policy.step(memory, policy.accelerated(signals, du), observation)
+    found, _ = policy.step(memory, policy.with_residual(signals, du), observation)
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
     env.close()
 
@@ -90,11 +90,11 @@ def test_two_residuals_add_up():
     """A policy with a residual is a base like any other."""
     env = make("BipedWalk-Payload-v0")
     observation, _ = env.reset(seed=0)
-    residual = Residual.of(env, Recipe("ojas", channel="joints", gated=False))
+    residual = Residual.of(env, ResidualConfig("ojas", action_mode="joints", gated=False))
     size = residual.features.size
     own = np.linspace(-0.5, 0.5, 12)
     constant = Network(np.zeros(size, "f4"), np.ones(size, "f4"), ((np.zeros((size, 12), "f4"), own.astype("f4")),))
-    policy = ResidualPolicy("x", Plant.of(env), residual, constant)
+    policy = ResidualPolicy("x", ControlInterface.of(env), residual, constant)
     base = controllers.make("tde", env)
     more = np.linspace(3.0, -1.0, 12)
     found, _ = policy.predict(observation, residual=more)
@@ -112,10 +112,10 @@ def test_ankles_and_inverse_kinematics_agree():
 
 def test_moved_ankles_arrive_within_reach_and_stay_where_nothing_moves():
     ankles = np.tile([0.02, 0.0, -0.37], (2, 1))
-    assert not legs.moved(ankles, np.zeros((2, 3))).any()
+    assert not legs.joint_offsets(ankles, np.zeros((2, 3))).any()
     before = leg_angles(ankles, robot.THIGH, robot.SHANK)
     offset = np.array([[0.05, 0.03, 0.02], [0.3, 0.0, 0.0]])
-    after = legs.ankle(before + legs.moved(ankles, offset))
+    after = legs.ankle(before + legs.joint_offsets(ankles, offset))
     np.testing.assert_allclose(after[0], ankles[0] + offset[0], atol=1e-12)
     assert np.linalg.norm(after[1]) == pytest.approx(legs.REACH[1])  # as far as the leg reaches
 
@@ -137,11 +137,11 @@ def walking_observation(rng, load_left: float) -> np.ndarray:
     return observation
 
 
-@pytest.mark.parametrize("channel", ["synergies", "wide-synergies", "joints"])
-def test_the_mirrored_robot_gets_the_mirrored_residual(channel):
+@pytest.mark.parametrize("action_mode", ["synergies", "wide-synergies", "joints"])
+def test_the_mirrored_robot_gets_the_mirrored_residual(action_mode):
     rng = np.random.default_rng(2)
     env = make("BipedWalk-Payload-v0")
-    residual = Residual.of(env, Recipe("ojas", channel=channel))
+    residual = Residual.of(env, ResidualConfig("ojas", action_mode=action_mode))
     mirror = legs.Mirror(OBSERVATION)
     observation = walking_observation(rng, 1.0)
     np.testing.assert_array_equal(mirror(mirror(observation)), observation)
@@ -150,10 +150,10 @@ def test_the_mirrored_robot_gets_the_mirrored_residual(channel):
     for seen in (observation, mirror(observation)):
         memory = residual.start(seen)
         features, memory = residual.observe(seen, memory)
-        coupling = residual.decide(memory, action).coupling
+        adapter = residual.set_action(memory, action).adapter
         for _ in range(6):
-            _, coupling = residual.coupling.advance(coupling)
-        du, _ = residual.coupling.advance(coupling)
+            _, adapter = residual.adapter.next_residual(adapter)
+        du, _ = residual.adapter.next_residual(adapter)
         found.append((features, du))
     (features, du), (features_mirrored, du_mirrored) = found
     np.testing.assert_allclose(features_mirrored, features, rtol=0, atol=1e-12)
@@ -173,21 +173,21 @@ def test_the_gate_opens_by_tilt_or_by_velocity_error(tilt, speed, expected):
     observation[at["tilt"]] = 0.6 * tilt, 0.8 * tilt
     observation[at["base_velocity"]] = 0.6 * speed, -0.8 * speed, 0.3
     env = make("BipedWalk-Payload-v0")
-    residual = Residual.of(env, Recipe("ojas"))
+    residual = Residual.of(env, ResidualConfig("ojas"))
     features, memory = residual.observe(observation, residual.start(observation))
     gate = residual.features.split(features)["gate"][0]
     assert gate == pytest.approx(expected, abs=1e-9)
-    du, _ = residual.coupling.advance(residual.decide(memory, np.ones(11)).coupling)
+    du, _ = residual.adapter.next_residual(residual.set_action(memory, np.ones(11)).adapter)
     assert du.any() == (expected > 0)
     # and it closes slowly
     observation[at["tilt"]] = observation[at["base_velocity"]] = 0.0
     _, memory = residual.observe(observation, memory)
-    assert memory.coupling.gate == pytest.approx(expected * np.exp(-0.02 / ojas.CLOSING))
+    assert memory.adapter.gate == pytest.approx(expected * np.exp(-0.02 / ojas.CLOSING))
     env.close()
 
 
 def test_a_walk_without_pushes_keeps_the_gate_shut():
-    env = ResidualEnv(make("BipedWalk-Payload-v0", disturbances={"payload": 1.3}, duration=4.0), Recipe("ojas"))
+    env = ResidualEnv(make("BipedWalk-Payload-v0", disturbances={"payload": 1.3}, duration=4.0), ResidualConfig("ojas"))
     features, _ = env.reset(seed=0)
     for _ in range(190):
         features, *_ = env.step(np.ones(11))
@@ -197,52 +197,54 @@ def test_a_walk_without_pushes_keeps_the_gate_shut():
 
 def test_a_foot_on_the_ground_keeps_its_offset_until_it_swings_again():
     env = make("BipedWalk-Payload-v0")
-    residual = Residual.of(env, Recipe("ojas", gated=False))
+    residual = Residual.of(env, ResidualConfig("ojas", gated=False))
     rng = np.random.default_rng(4)
     left, both, right = (walking_observation(rng, load) for load in (1.0, 0.7, 0.0))
     step = np.zeros(11)
     step[0], step[1] = 0.5, 0.5  # forward and outward
     _, memory = residual.observe(left, residual.start(left))
-    memory = residual.decide(memory, step)
-    np.testing.assert_allclose(memory.coupling.offsets, [0, 0, 0.05, -0.03])
+    memory = residual.set_action(memory, step)
+    np.testing.assert_allclose(memory.adapter.offsets, [0, 0, 0.05, -0.03])
     _, memory = residual.observe(both, memory)
-    memory = residual.decide(memory, np.zeros(11))
-    np.testing.assert_allclose(memory.coupling.offsets, [0, 0, 0.05, -0.03])
+    memory = residual.set_action(memory, np.zeros(11))
+    np.testing.assert_allclose(memory.adapter.offsets, [0, 0, 0.05, -0.03])
     _, memory = residual.observe(right, memory)  # now it stands, and the picture is mirrored
-    np.testing.assert_allclose(memory.coupling.offsets, [0.05, 0.03, 0, 0])
-    memory = residual.decide(memory, np.zeros(11))
-    np.testing.assert_allclose(memory.coupling.offsets, [0.05, 0.03, 0, 0])
+    np.testing.assert_allclose(memory.adapter.offsets, [0.05, 0.03, 0, 0])
+    memory = residual.set_action(memory, np.zeros(11))
+    np.testing.assert_allclose(memory.adapter.offsets, [0.05, 0.03, 0, 0])
     _, memory = residual.observe(left, memory)
-    memory = residual.decide(memory, np.zeros(11))
-    assert not memory.coupling.offsets.any()
+    memory = residual.set_action(memory, np.zeros(11))
+    assert not memory.adapter.offsets.any()
     env.close()
 
 
 def test_du_is_bounded_and_held_for_whole_control_periods():
     env = make("BipedWalk-Payload-v0")
-    residual = Residual.of(env, Recipe("ojas", channel="joints", limit=7.0, gated=False))
+    residual = Residual.of(env, ResidualConfig("ojas", action_mode="joints", action_scale=7.0, gated=False))
     observation, _ = env.reset(seed=0)
-    memory = residual.decide(residual.observe(observation, residual.start(observation))[1], np.full(12, 9.0))
-    coupling = memory.coupling
+    memory = residual.set_action(residual.observe(observation, residual.start(observation))[1], np.full(12, 9.0))
+    adapter = memory.adapter
     for _ in range(residual.periods):
-        du, coupling = residual.coupling.advance(coupling)
+        du, adapter = residual.adapter.next_residual(adapter)
         np.testing.assert_array_equal(np.abs(du), 7.0)
     assert residual.periods == 20
-    with pytest.raises(OptionError, match=r"hold is 0\.0205; allowed: whole multiples of the control period 0\.001 s"):
-        Residual.of(env, Recipe("ojas", hold=0.0205))
+    with pytest.raises(
+        OptionError, match=r"decision_period is 0\.0205; allowed: whole multiples of the control period 0\.001 s"
+    ):
+        Residual.of(env, ResidualConfig("ojas", decision_period=0.0205))
     env.close()
 
 
 def test_the_actor_is_asked_once_a_decision_and_each_environment_by_its_own_clock():
     env = make("QuadInfinity-Payload-v0", control_period=0.005)
-    residual = Residual.of(env, Recipe("q450"))
+    residual = Residual.of(env, ResidualConfig("q450"))
     asked = []
 
     def actor(features):
         asked.append(len(features))
         return np.zeros((*features.shape[:-1], 3))
 
-    policy = ResidualPolicy("x", Plant.of(env), residual, actor)
+    policy = ResidualPolicy("x", ControlInterface.of(env), residual, actor)
     observation, _ = env.reset(seed=0)
     pair = np.stack([observation] * 2)
     _, state = policy.predict(pair)
@@ -258,11 +260,11 @@ def test_the_actor_is_asked_once_a_decision_and_each_environment_by_its_own_cloc
 def test_many_at_once_are_each_what_one_is_alone():
     rng = np.random.default_rng(5)
     env = make("BipedWalk-Payload-v0")
-    residual = Residual.of(env, Recipe("ojas"))
+    residual = Residual.of(env, ResidualConfig("ojas"))
     size = residual.features.size
     weights = rng.normal(0, 0.3, (size, 11)).astype("f4")
     network = Network(np.zeros(size, "f4"), np.ones(size, "f4"), ((weights, np.zeros(11, "f4")),))
-    policy = ResidualPolicy("x", Plant.of(env), residual, network)
+    policy = ResidualPolicy("x", ControlInterface.of(env), residual, network)
     runs = np.array([[walking_observation(rng, load) for load in (1.0, 0.0, 0.7)] for _ in range(25)])
     state, together = None, []
     for seen in runs:
@@ -277,9 +279,9 @@ def test_many_at_once_are_each_what_one_is_alone():
 
 
 def test_no_base_gives_the_force_itself():
-    env = ResidualEnv(make("QuadInfinity-Payload-v0"), Recipe("q450", "none"))
+    env = ResidualEnv(make("QuadInfinity-Payload-v0"), ResidualConfig("q450", "none"))
     observation, _ = env.env.reset(seed=0)
-    memory = env.residual.decide(env.residual.start(observation), np.array([1.0, 0.0, 0.0, -1.0]))
+    memory = env.residual.set_action(env.residual.start(observation), np.array([1.0, 0.0, 0.0, -1.0]))
     force, _ = env.residual.control(observation, memory)
     box = ACTION.box()
     np.testing.assert_allclose(force, [box.high[0], 0.0, 0.0, box.low[3]])
@@ -287,7 +289,7 @@ def test_no_base_gives_the_force_itself():
 
 
 def test_actions_are_checked():
-    env = ResidualEnv(make("QuadInfinity-Payload-v0"), Recipe("q450"))
+    env = ResidualEnv(make("QuadInfinity-Payload-v0"), ResidualConfig("q450"))
     with pytest.raises(gym.error.ResetNeeded):
         env.step(np.zeros(3))
     env.reset(seed=0)

@@ -22,8 +22,8 @@ from artde_gym.evaluation import evaluate
 from baselines.errors import PolicyFileError
 from baselines.network import Network
 from baselines.policy_file import Saved, layout_hash, read, save
-from baselines.recipe import Recipe
 from baselines.residual import Residual
+from baselines.residual_config import ResidualConfig
 from baselines.saved import SHIPPED
 
 QUADROTOR = {"disturbances": {}, "duration": 1.0}
@@ -39,7 +39,7 @@ def env():
 @pytest.fixture
 def saved(env):
     rng = np.random.default_rng(0)
-    residual = Residual.of(env, Recipe("q450"))
+    residual = Residual.of(env, ResidualConfig("q450"))
     sizes = (residual.features.size, 8, len(residual.actions))
     layers = tuple(
         (rng.normal(0, 0.3, (a, b)).astype("f4"), rng.normal(0, 0.1, b).astype("f4"))
@@ -48,7 +48,7 @@ def saved(env):
     mean, variance = rng.normal(size=sizes[0]).astype("f4"), rng.uniform(0.5, 2, sizes[0]).astype("f4")
     network = Network(mean, variance, layers)
     return Saved(
-        "tde+x", residual.recipe, network, layout_hash(residual.features), residual.actions, 0.015, "q450", {"seed": 3}
+        "tde+x", residual.config, network, layout_hash(residual.features), residual.actions, 0.015, "q450", {"seed": 3}
     )
 
 
@@ -142,7 +142,7 @@ def test_a_missing_array_or_another_shape_is_refused(folder):
         ({"features_sha256": "0"}, r"what 'tde\+x' sees is '0'"),
         ({"actions": ["x"]}, r"what 'tde\+x' does"),
         ({"recipe": {"robot": "q450", "unknown": 1}}, "unknown"),
-        ({"recipe": {"robot": "q450", "limit": -1.0}}, "limit"),
+        ({"recipe": {"robot": "q450", "action_scale": -1.0}}, "action_scale"),
         ({"recipe": {"robot": "ojas"}}, r"nominal_robot is 'q450'"),
     ],
 )
@@ -201,7 +201,7 @@ def test_shipped_policies_fit_their_environments_and_have_a_card(name):
     for _ in range(3):
         action, state = policy.predict(observation, state)
         observation, *_ = env.step(action)
-    assert set(policy.diagnostics(state)) > {"sigma"} or saved.recipe.robot == "q450"
+    assert set(policy.diagnostics(state)) > {"sigma"} or saved.config.robot == "q450"
     env.close()
 
 

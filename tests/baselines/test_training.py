@@ -21,7 +21,7 @@ from artde_gym.errors import OptionError
 from artde_gym.report import write_report
 from baselines.errors import TrainingError
 from baselines.export import exported
-from baselines.recipe import Recipe
+from baselines.residual_config import ResidualConfig
 from baselines.residual_env import ResidualEnv
 from baselines.rollouts import OpenRollouts
 from baselines.run import Run, Training
@@ -40,7 +40,7 @@ def small(algo: str = "ppo", **more: Any) -> Training:
     options = {"n_steps": 8, "batch_size": 16} if algo == "ppo" else {"learning_starts": 8, "buffer_size": 4096}
     return Training(
         QUADROTOR,
-        Recipe("q450"),
+        ResidualConfig("q450"),
         algo=algo,
         envs=4,
         env_kwargs={"duration": 1.0},
@@ -105,7 +105,7 @@ def test_a_killed_training_continues_from_its_last_checkpoint(tmp_path):
     steps = json.loads((newest / "state.json").read_text())["steps"]
     assert steps > 0
     configuration = json.loads((tmp_path / "run.json").read_text())["configuration"]
-    recipe = Recipe(**configuration.pop("recipe"))
+    recipe = ResidualConfig(**configuration.pop("recipe"))
     configuration.pop("engine")  # which the environment and its arguments decide
     training = Training(**{**configuration, "recipe": recipe, "steps": steps + 1})
     train(training, tmp_path)
@@ -156,7 +156,7 @@ def test_numpy_inference_equals_torch(tmp_path, quick):
 @pytest.mark.parametrize(("env_id", "robot"), [("BipedPush-v0", "ojas"), (QUADROTOR, "q450")])
 @pytest.mark.filterwarnings("ignore:Your observation .* has an unconventional shape")
 def test_a_single_environment_passes_the_checker_of_sb3(env_id, robot):
-    env = ResidualEnv(gym.make(env_id, disable_env_checker=True, duration=3.0), Recipe(robot))
+    env = ResidualEnv(gym.make(env_id, disable_env_checker=True, duration=3.0), ResidualConfig(robot))
     check_env(env, skip_render_check=True)
     env.close()
 
@@ -164,7 +164,10 @@ def test_a_single_environment_passes_the_checker_of_sb3(env_id, robot):
 def test_the_adapter_steps_each_vehicle_as_a_single_batch_would():
     """Same seeds and actions: rewards and features equal, and a new episode begins at once after the last step."""
     kwargs = {"duration": 0.15, "disturbances": GALE}
-    pair, one = ResidualVecEnv(batch(2, **kwargs), Recipe("q450")), ResidualVecEnv(batch(1, **kwargs), Recipe("q450"))
+    pair, one = (
+        ResidualVecEnv(batch(2, **kwargs), ResidualConfig("q450")),
+        ResidualVecEnv(batch(1, **kwargs), ResidualConfig("q450")),
+    )
     pair.seed(11)
     one._seeds = [12]
     together: Any = pair.reset()
@@ -189,8 +192,10 @@ def test_the_adapter_steps_each_vehicle_as_a_single_batch_would():
 
 def test_the_adapter_is_what_the_single_environment_is():
     """In still air, over some decisions, up to the different physics."""
-    vector = ResidualVecEnv(batch(1, duration=2.0, disturbances={}), Recipe("q450"))
-    single = ResidualEnv(gym.make(QUADROTOR, disable_env_checker=True, duration=2.0, disturbances={}), Recipe("q450"))
+    vector = ResidualVecEnv(batch(1, duration=2.0, disturbances={}), ResidualConfig("q450"))
+    single = ResidualEnv(
+        gym.make(QUADROTOR, disable_env_checker=True, duration=2.0, disturbances={}), ResidualConfig("q450")
+    )
     many: Any = vector.reset()
     one, rewards, reward = single.reset(seed=0)[0], np.zeros(1), 0.0
     for k in range(60):
@@ -223,8 +228,10 @@ FALLING = {
 
 def test_the_adapter_is_the_single_biped_to_the_bit():
     """Falls within a decision, and what begins after them, included."""
-    vector = batched("BipedPush-v0", Recipe("ojas"), 3, FALLING)
-    single = ResidualEnv(gym.make("BipedPush-v0", disable_env_checker=True, engine="mujoco", **FALLING), Recipe("ojas"))
+    vector = batched("BipedPush-v0", ResidualConfig("ojas"), 3, FALLING)
+    single = ResidualEnv(
+        gym.make("BipedPush-v0", disable_env_checker=True, engine="mujoco", **FALLING), ResidualConfig("ojas")
+    )
     vector.seed(7)
     many: Any = vector.reset()
     one, _ = single.reset(seed=9)
@@ -246,12 +253,12 @@ def test_the_adapter_is_the_single_biped_to_the_bit():
 
 
 def test_the_adapter_says_what_it_cannot_do():
-    env = ResidualVecEnv(batch(2, duration=1.0), Recipe("q450"))
+    env = ResidualVecEnv(batch(2, duration=1.0), ResidualConfig("q450"))
     assert VecMonitor(env).num_envs == 2
     with pytest.raises(OptionError, match="none: they share one environment"):
         env.set_attr("x", 1)
-    with pytest.raises(OptionError, match=r"hold is 0\.02"):
-        ResidualVecEnv(batch(2, duration=1.0), Recipe("q450", hold=0.02))
+    with pytest.raises(OptionError, match=r"decision_period is 0\.02"):
+        ResidualVecEnv(batch(2, duration=1.0), ResidualConfig("q450", decision_period=0.02))
     env.close()
 
 
@@ -272,7 +279,7 @@ def test_decisions_under_a_shut_gate_are_mostly_left_out_of_rollouts():
         assert 0 < (got[:, 1] == 0).sum() <= steps * count / 5
 
 
-def returns(actor: Any, recipe: Recipe, count: int = 64) -> np.ndarray:
+def returns(actor: Any, recipe: ResidualConfig, count: int = 64) -> np.ndarray:
     """Of held-out flights of three seconds, up to a crash."""
     env = ResidualVecEnv(batch(count, duration=3.0, disturbances=GALE), recipe)
     env.seed(10_000)
@@ -288,7 +295,7 @@ def returns(actor: Any, recipe: Recipe, count: int = 64) -> np.ndarray:
 
 def test_something_is_learnt(tmp_path):
     """2.4 million decisions on TDE, with the task's own options: held-out return above the zero residual's."""
-    recipe = Recipe("q450")
+    recipe = ResidualConfig("q450")
     run = Run(Training(QUADROTOR, recipe, steps=2_392_064), tmp_path)
     env, residual = environments(run.training, run)
     trainer = Trainer(run, env, residual)

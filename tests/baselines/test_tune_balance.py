@@ -10,8 +10,8 @@ import pytest
 import artde_gym  # noqa: F401  # registers the environments
 from baselines.balance import GAINS, balance_network
 from baselines.errors import TrainingError
-from baselines.recipe import Recipe
 from baselines.residual import Residual
+from baselines.residual_config import ResidualConfig
 from baselines.residual_env import ResidualEnv
 from baselines.run import Training
 
@@ -19,7 +19,7 @@ from baselines.run import Training
 @pytest.fixture
 def residual():
     env = gym.make("BipedPush-v0", disable_env_checker=True, duration=0.5, disturbances={})
-    yield Residual.of(env, Recipe("ojas"))
+    yield Residual.of(env, ResidualConfig("ojas"))
     env.close()
 
 
@@ -56,7 +56,9 @@ def tuning(monkeypatch):
 
 
 def training(steps: int) -> Training:
-    return Training("BipedPush-v0", Recipe("ojas"), "cma-es", steps, env_kwargs={"engine": "mujoco"}, test_every=100)
+    return Training(
+        "BipedPush-v0", ResidualConfig("ojas"), "cma-es", steps, env_kwargs={"engine": "mujoco"}, test_every=100
+    )
 
 
 def generations(folder) -> list[dict[str, Any]]:
@@ -76,12 +78,14 @@ def test_a_continued_tuning_equals_one_that_never_stopped(tuning, tmp_path):
 @pytest.mark.torch
 def test_candidates_are_judged_as_if_each_were_alone(tuning):
     kwargs = {"duration": tuning.DURATION, "self_collision": True, "disturbances": tuning._PUSH}
-    env = tuning.batched("BipedPush-v0", Recipe("ojas"), 4, kwargs)
+    env = tuning.batched("BipedPush-v0", ResidualConfig("ojas"), 4, kwargs)
     rng = np.random.default_rng(2)
     networks = [balance_network(rng.normal(0, 0.5, GAINS), env.residual.features, env.residual.actions) for _ in "ab"]
     seeds = [3, 11]
     costs, count = tuning._judge(env, networks, seeds)
-    alone = ResidualEnv(gym.make("BipedPush-v0", disable_env_checker=True, engine="mujoco", **kwargs), Recipe("ojas"))
+    alone = ResidualEnv(
+        gym.make("BipedPush-v0", disable_env_checker=True, engine="mujoco", **kwargs), ResidualConfig("ojas")
+    )
     steps, falls = 0, 0
     for network, cost in zip(networks, costs, strict=True):
         total = 0.0
@@ -103,8 +107,11 @@ def test_candidates_are_judged_as_if_each_were_alone(tuning):
 @pytest.mark.torch
 def test_what_has_no_balance_law_or_no_batch_is_refused(tuning, tmp_path):
     with pytest.raises(TrainingError, match="the biped's synergies, of which the law has gains"):
-        tuning.tune(Training("BipedPush-v0", Recipe("ojas", channel="joints"), "cma-es"), tmp_path / "joints")
+        tuning.tune(
+            Training("BipedPush-v0", ResidualConfig("ojas", action_mode="joints"), "cma-es"), tmp_path / "joints"
+        )
     with pytest.raises(TrainingError, match="engine is 'bullet'; allowed: 'mujoco'"):
         tuning.tune(
-            Training("BipedPush-v0", Recipe("ojas"), "cma-es", env_kwargs={"engine": "bullet"}), tmp_path / "bullet"
+            Training("BipedPush-v0", ResidualConfig("ojas"), "cma-es", env_kwargs={"engine": "bullet"}),
+            tmp_path / "bullet",
         )

@@ -18,8 +18,8 @@ from artde_gym.errors import ArtdeGymError
 from controllers import GainError
 from controllers.design import design, judge, loops
 from controllers.drive import DRIVES
+from controllers.laws.stability import largest_joint_m_bar, largest_m_bar, tde_eigenvalues, tde_is_valid
 from controllers.laws.tde import TdeGains
-from controllers.laws.validity import largest_joint_m_bar, largest_m_bar, tde_eigenvalues, tde_is_valid
 
 RNG = np.random.default_rng(5)
 

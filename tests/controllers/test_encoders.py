@@ -13,21 +13,21 @@ import artde_gym  # noqa: F401  # registers the environments
 import controllers
 from artde_gym.info import fall_reason
 from controllers import GainError
-from controllers.laws.tracking import Signals
-from controllers.laws.velocity_estimate import estimate, estimate_start
+from controllers.laws.tracking import JointInput
+from controllers.laws.velocity_estimate import estimate, estimate_init
 
 PERIOD = 0.001
 
 
-def signals(q: np.ndarray) -> Signals:
+def signals(q: np.ndarray) -> JointInput:
     zero = np.zeros_like(q)
-    return Signals(q, zero, zero, zero, zero, zero)
+    return JointInput(q, zero, zero, zero, zero, zero)
 
 
 def test_ramp_is_followed_with_the_time_constant_of_the_filter() -> None:
     """qd_hat of a ramp of slope v from rest is v (1 - p^k), p = exp(-2 pi f L)."""
     cutoff, slope = 20.0, 3.0
-    memory = estimate_start(signals(np.zeros(1)), PERIOD)
+    memory = estimate_init(signals(np.zeros(1)), PERIOD)
     for k in range(1, 101):
         seen, memory = estimate(cutoff, memory, signals(np.array([slope * PERIOD * k])), PERIOD)
         assert seen.qd[0] == pytest.approx(slope * (1 - math.exp(-2 * math.pi * cutoff * PERIOD * k)))
@@ -37,7 +37,7 @@ def test_batch_equals_loop() -> None:
     q = np.random.default_rng(0).normal(size=(5, 3, 12))
 
     def run(path: np.ndarray) -> np.ndarray:
-        memory = estimate_start(signals(path[0]), PERIOD)
+        memory = estimate_init(signals(path[0]), PERIOD)
         seen = signals(path[0])
         for angles in path:
             seen, memory = estimate(30.0, memory, signals(angles), PERIOD)

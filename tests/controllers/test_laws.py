@@ -13,16 +13,17 @@ from hypothesis.extra.numpy import arrays
 from scipy.linalg import solve_continuous_lyapunov
 from scipy.signal import cont2discrete
 
-from controllers.laws.artde import ArtdeGains, artde, artde_start
-from controllers.laws.asmc import AsmcGains, asmc, asmc_start
-from controllers.laws.atde import AtdeGains, atde, atde_start
+from controllers.laws.artde import ArtdeGains, artde, artde_init
+from controllers.laws.asmc import AsmcGains, asmc, asmc_init
+from controllers.laws.atde import AtdeGains, atde, atde_init
 from controllers.laws.computed_torque import ComputedTorqueGains, computed_torque
 from controllers.laws.errors import GainError
-from controllers.laws.indi import IndiGains, indi, indi_start
-from controllers.laws.pid import PidGains, identity_gains, pid, pid_start
-from controllers.laws.positional_pid import PositionalPidGains, positional_pid, positional_pid_start
+from controllers.laws.indi import IndiGains, indi, indi_init
+from controllers.laws.pid import PidGains, identity_gains, pid, pid_init
+from controllers.laws.positional_pid import PositionalPidGains, positional_pid, positional_pid_init
 from controllers.laws.rigid_attitude import RigidAttitudeGains, rigid_attitude
-from controllers.laws.second_order import FilterMemory, second_order
+from controllers.laws.second_order import FilterState, second_order
+from controllers.laws.stability import tde_eigenvalues, tde_is_valid
 from controllers.laws.tde import (
     ConstantGains,
     TdeGains,
@@ -30,10 +31,9 @@ from controllers.laws.tde import (
     equivalent_gains,
     inertia_times,
     tde,
-    tde_start,
+    tde_init,
 )
-from controllers.laws.tracking import Signals, sliding_variable, smooth_sign
-from controllers.laws.validity import tde_eigenvalues, tde_is_valid
+from controllers.laws.tracking import JointInput, sliding_variable, smooth_sign
 
 PERIOD = 0.004
 FEEDBACK: dict[str, dict[str, Any]] = {
@@ -74,35 +74,35 @@ def pendulums(q, qd, qdd):
     return 0.04 * qdd + 0.1 * qd + 2.0 * np.sin(q)
 
 
-def without_gains(start: Callable[[Signals, float], Any]) -> Callable[..., Any]:
+def without_gains(start: Callable[[JointInput, float], Any]) -> Callable[..., Any]:
     return lambda gains, signals, period: start(signals, period)
 
 
 LAWS = {
-    "tde": Law(lambda feedback: TdeGains(**feedback), without_gains(tde_start), tde),
+    "tde": Law(lambda feedback: TdeGains(**feedback), without_gains(tde_init), tde),
     "tde+c": Law(
-        lambda feedback: ConstantGains(**feedback, **ADAPTIVE, c=0.3), without_gains(tde_start), constant_gain_tde
+        lambda feedback: ConstantGains(**feedback, **ADAPTIVE, c=0.3), without_gains(tde_init), constant_gain_tde
     ),
     "atde": Law(
-        lambda feedback: AtdeGains(**feedback, **ADAPTIVE, gamma_0=500.0, c_floor=0.01, c_start=0.01), atde_start, atde
+        lambda feedback: AtdeGains(**feedback, **ADAPTIVE, gamma_0=500.0, c_floor=0.01, c_start=0.01), atde_init, atde
     ),
-    "artde": Law(lambda feedback: ArtdeGains(**feedback, **ARTDE), artde_start, artde),
-    "artde-robust": Law(lambda feedback: ArtdeGains(**feedback, **{**ARTDE, **ROBUST}), artde_start, artde),
-    "pid": Law(lambda feedback: identity_gains(TdeGains(**feedback), PERIOD), without_gains(pid_start), pid),
+    "artde": Law(lambda feedback: ArtdeGains(**feedback, **ARTDE), artde_init, artde),
+    "artde-robust": Law(lambda feedback: ArtdeGains(**feedback, **{**ARTDE, **ROBUST}), artde_init, artde),
+    "pid": Law(lambda feedback: identity_gains(TdeGains(**feedback), PERIOD), without_gains(pid_init), pid),
     "computed-torque": Law(
         lambda feedback: ComputedTorqueGains(feedback["k_p"], feedback["k_d"]),
         lambda gains, signals, period: (),
         lambda gains, memory, signals, period: (computed_torque(gains, signals, pendulums), memory),
     ),
-    "indi": Law(lambda feedback: IndiGains(**feedback, **FILTER), without_gains(indi_start), indi),
+    "indi": Law(lambda feedback: IndiGains(**feedback, **FILTER), without_gains(indi_init), indi),
     "asmc": Law(
         lambda feedback: AsmcGains(feedback["m_bar"], **SLIDING),
-        lambda gains, signals, period: asmc_start(gains, signals),
+        lambda gains, signals, period: asmc_init(gains, signals),
         asmc,
     ),
     "positional-pid": Law(
         lambda feedback: PositionalPidGains(**feedback, k_i=3.0, integral_limit=20.0),
-        lambda gains, signals, period: positional_pid_start(gains, signals),
+        lambda gains, signals, period: positional_pid_init(gains, signals),
         positional_pid,
     ),
     "rigid-attitude": Law(
@@ -120,9 +120,9 @@ every_law = pytest.mark.parametrize(("name", "feedback"), CASES)
 
 def run(law: Law, gains: Any, samples: np.ndarray, period: float = PERIOD) -> list[tuple[np.ndarray, ...]]:
     """Command and all arrays of the memory after each of `samples` (time, signal, ..., n)."""
-    memory, results = law.start(gains, Signals(*samples[0]), period), []
+    memory, results = law.start(gains, JointInput(*samples[0]), period), []
     for sample in samples:
-        tau, memory = law.step(gains, memory, Signals(*sample), period)
+        tau, memory = law.step(gains, memory, JointInput(*sample), period)
         results.append((tau, *leaves(memory)))
     return results
 
@@ -132,11 +132,11 @@ def leaves(memory: Any) -> list[np.ndarray]:
     return [leaf for part in memory for leaf in leaves(part)] if isinstance(memory, tuple) else [memory]
 
 
-def signals(e: Any, ed: Any, tau_applied: Any = 0.0) -> Signals:
+def signals(e: Any, ed: Any, tau_applied: Any = 0.0) -> JointInput:
     """Signals of a robot at rest at q = 0 with errors `e` and `ed`."""
     e, ed, tau_applied = (np.array(value, dtype=np.float64) for value in np.broadcast_arrays(e, ed, tau_applied))
     zero = np.zeros_like(e)
-    return Signals(zero, zero, e, ed, zero, tau_applied)
+    return JointInput(zero, zero, e, ed, zero, tau_applied)
 
 
 # --------------------------------------------------------------------------------------------------- batches, precision
@@ -174,9 +174,9 @@ def test_batch_equals_loop_for_twelve_joints_in_slices_of_observations(name):
         return [[row[..., 12 * i : 12 * (i + 1)] for i in range(6)] for row in rows]
 
     def results(rows: np.ndarray) -> list[tuple[np.ndarray, ...]]:
-        memory, out = law.start(gains, Signals(*samples(rows)[0]), PERIOD), []
+        memory, out = law.start(gains, JointInput(*samples(rows)[0]), PERIOD), []
         for sample in samples(rows):
-            tau, memory = law.step(gains, memory, Signals(*sample), PERIOD)
+            tau, memory = law.step(gains, memory, JointInput(*sample), PERIOD)
             out.append((tau, *leaves(memory)))
         return out
 
@@ -222,10 +222,10 @@ def test_inputs_are_left_alone(name, feedback):
     samples = smooth_samples()[:3]
     before = samples.copy()
     samples.setflags(write=False)
-    memory = law.start(gains, Signals(*samples[0]), PERIOD)
-    _, memory = law.step(gains, memory, Signals(*samples[0]), PERIOD)
+    memory = law.start(gains, JointInput(*samples[0]), PERIOD)
+    _, memory = law.step(gains, memory, JointInput(*samples[0]), PERIOD)
     kept = [leaf.copy() for leaf in leaves(memory)]
-    law.step(gains, memory, Signals(*samples[1]), PERIOD)
+    law.step(gains, memory, JointInput(*samples[1]), PERIOD)
     np.testing.assert_array_equal(samples, before)
     for leaf, copy in zip(leaves(memory), kept, strict=True):
         np.testing.assert_array_equal(leaf, copy)
@@ -237,12 +237,12 @@ def test_inputs_are_left_alone(name, feedback):
 def test_tde_by_hand():
     gains = TdeGains(m_bar=2.0, k_p=4.0, k_d=3.0)
     # u = 0.5 + 3 * 1 + 4 * 1 = 7.5; a = qdd_ref = 0.5; tau = 10 + 2 * 7 = 24; no sigma yet
-    first = Signals(*np.array([[1.0], [0.0], [2.0], [1.0], [0.5], [10.0]]))
-    tau, memory = tde(gains, tde_start(first, 0.5), first, 0.5)
+    first = JointInput(*np.array([[1.0], [0.0], [2.0], [1.0], [0.5], [10.0]]))
+    tau, memory = tde(gains, tde_init(first, 0.5), first, 0.5)
     assert (tau, memory.sigma) == (24.0, 0.0)
     # u = 1 + 3 * 0.5 + 4 * 0.5 = 4.5; a = (1 - 0) / 0.5 = 2; sigma = 7.5 - 2;
     # of the 24 only 20 were applied: tau = 20 + 2 * 2.5 = 25
-    second = Signals(*np.array([[1.5], [1.0], [2.0], [1.5], [1.0], [20.0]]))
+    second = JointInput(*np.array([[1.5], [1.0], [2.0], [1.5], [1.0], [20.0]]))
     tau, memory = tde(gains, memory, second, 0.5)
     assert (tau, memory.sigma) == (25.0, 5.5)
 
@@ -250,11 +250,11 @@ def test_tde_by_hand():
 def test_pid_by_hand():
     gains = PidGains(proportional=3.0, integral=4.0, derivative=5.0)
     # 10 + 3 * 0.5 * 1 + 4 * 0.5 * 1, no derivative yet
-    first = Signals(*np.array([[1.0], [0.0], [2.0], [1.0], [0.5], [10.0]]))
-    tau, memory = pid(gains, pid_start(first, 0.5), first, 0.5)
+    first = JointInput(*np.array([[1.0], [0.0], [2.0], [1.0], [0.5], [10.0]]))
+    tau, memory = pid(gains, pid_init(first, 0.5), first, 0.5)
     assert tau == 13.5
     # 20 + 3 * 0.5 * 0.5 + 4 * 0.5 * 0.5 + 5 * (0.5 * 1 - (1 - 0)) = 20 + 0.75 + 1 - 2.5
-    tau, _ = pid(gains, memory, Signals(*np.array([[1.5], [1.0], [2.0], [1.5], [1.0], [20.0]])), 0.5)
+    tau, _ = pid(gains, memory, JointInput(*np.array([[1.5], [1.0], [2.0], [1.5], [1.0], [20.0]])), 0.5)
     assert tau == 19.25
 
 
@@ -275,8 +275,8 @@ def test_indi_delays_acceleration_and_force_alike():
     for _ in range(50):
         force = rng.normal(size=3)
         q_ref, qd_ref, zero = *rng.normal(size=(2, 3)), np.zeros(3)
-        before = Signals(zero, qd, q_ref, qd_ref, zero, zero)
-        memory = indi_start(before, period) if memory is None else memory
+        before = JointInput(zero, qd, q_ref, qd_ref, zero, zero)
+        memory = indi_init(before, period) if memory is None else memory
         qd = qd + period / 2.0 * force
         sample = before._replace(qd=qd, tau_applied=force)
         tau, memory = indi(gains, memory, sample, period)
@@ -287,11 +287,11 @@ def test_indi_delays_acceleration_and_force_alike():
 def test_positional_pid_by_hand():
     gains = PositionalPidGains(m_bar=2.0, k_p=4.0, k_d=3.0, k_i=8.0, integral_limit=9.0)
     # the integral starts at 10 / 2 - 0.5 = 4.5: 2 (0.5 + 4 + 3 + 4.5)
-    first = Signals(*np.array([[1.0], [0.0], [2.0], [1.0], [0.5], [10.0]]))
-    tau, memory = positional_pid(gains, positional_pid_start(gains, first), first, 0.5)
+    first = JointInput(*np.array([[1.0], [0.0], [2.0], [1.0], [0.5], [10.0]]))
+    tau, memory = positional_pid(gains, positional_pid_init(gains, first), first, 0.5)
     assert tau == 24.0
     # 4.5 + 0.5 * 8 * 1: 2 (1 + 2 + 1.5 + 8.5), whatever was applied
-    second = Signals(*np.array([[1.5], [1.0], [2.0], [1.5], [1.0], [99.0]]))
+    second = JointInput(*np.array([[1.5], [1.0], [2.0], [1.5], [1.0], [99.0]]))
     tau, memory = positional_pid(gains, memory, second, 0.5)
     assert tau == 26.0
     assert memory.integral == 9.0  # 8.5 + 2, clamped
@@ -315,7 +315,7 @@ def test_asmc_by_hand():
     )
     # s = ed + 2 e = (3, 4), sqrt(25 + 24) = 7; the weight 20 is held by 30: r = 1.5
     sample = signals((1.0, 0.0), (1.0, 4.0), tau_applied=(5.0, 30.0))
-    memory = asmc_start(gains, sample)
+    memory = asmc_init(gains, sample)
     assert (memory.c, memory.r) == (1.0, 1.5)
     # u - g = 2 ed + 3 s + s / 7, plus 10 upward
     lifted = np.array([2.0 + 9.0 + 3 / 7, 8.0 + 12.0 + 4 / 7 + 10.0])
@@ -348,7 +348,7 @@ def test_atde_by_hand():
         ((1.0, 0.0), 1.0),  # and grows from there, though |s| fell
         ((1.0, 0.0), 1.25),
     ]
-    memory = atde_start(gains, signals((0.0, 0.0), steps[0][0]), 0.5)
+    memory = atde_init(gains, signals((0.0, 0.0), steps[0][0]), 0.5)
     for ed, c in steps:
         used = float(memory.c)
         tau, memory = atde(gains, memory, signals((0.0, 0.0), ed, tau_applied=(7.0, -7.0)), 0.5)
@@ -424,7 +424,7 @@ def test_artde_by_hand(case):
     options, steps = ARTDE_BY_HAND[case]
     options = {"gamma_0": 0.5, "gamma_1": 0.125, "beta_floor": 1.0, "beta_start": 2.0, **options}
     gains = ArtdeGains(**ONES, alpha=2.0, eps=24.0, **options)
-    memory = artde_start(gains, signals(*steps[0][0]), 0.5)
+    memory = artde_init(gains, signals(*steps[0][0]), 0.5)
     for (e, ed), after in steps:
         b0, b1 = float(memory.beta_0), float(memory.beta_1)
         tau, memory = artde(gains, memory, signals(e, ed, tau_applied=(7.0, -7.0)), 0.5)
@@ -440,7 +440,7 @@ def test_artde_by_hand(case):
 @pytest.mark.parametrize("name", ["tde", "tde+c", "atde", "artde"])
 def test_du_adds_to_the_desired_acceleration(name):
     law = LAWS[name]
-    gains, sample = law.gains(FEEDBACK["matrix"]), Signals(*smooth_samples()[0])
+    gains, sample = law.gains(FEEDBACK["matrix"]), JointInput(*smooth_samples()[0])
     memory = law.start(gains, sample, PERIOD)
     extra = np.random.default_rng(4).normal(size=sample.q.shape)
     with_du, _ = law.step(gains, memory, sample, PERIOD, extra)
@@ -490,7 +490,7 @@ def test_equivalent_gains_are_the_slope_of_the_robust_term():
 
     def acceleration(e: np.ndarray, ed: np.ndarray) -> np.ndarray:  # u of the first sample
         sample = signals(e, ed)
-        return constant_gain_tde(gains, tde_start(sample, PERIOD), sample, PERIOD)[1].u
+        return constant_gain_tde(gains, tde_init(sample, PERIOD), sample, PERIOD)[1].u
 
     step = 1e-6
     for joint in range(3):
@@ -537,8 +537,8 @@ def follow(inertia: np.ndarray, gains: TdeGains, samples: int, period: float) ->
     history = []
     for k in range(samples):
         q_ref, qd_ref, qdd_ref = (np.full(2, f(k * period)) for f in (np.sin, np.cos, lambda t: -np.sin(t)))
-        sample = Signals(q, qd, q_ref, qd_ref, qdd_ref, tau)
-        tau, memory = tde(gains, memory or tde_start(sample, period), sample, period)
+        sample = JointInput(q, qd, q_ref, qd_ref, qdd_ref, tau)
+        tau, memory = tde(gains, memory or tde_init(sample, period), sample, period)
         qdd = np.linalg.solve(inertia, tau - load)
         history.append((q_ref - q, qd_ref - qd, memory.u, memory.sigma, qdd, qdd_ref))
         q, qd = q + period * qd + 0.5 * period**2 * qdd, qd + period * qdd
@@ -592,7 +592,7 @@ def test_second_order_is_exact_for_a_held_input(damping, natural, period):
     a = np.array([[0.0, 1.0], [-(natural**2), -2 * damping * natural]])
     b, c, d = np.array([[0.0], [natural**2]]), np.eye(2), np.zeros((2, 1))
     system: Any = cont2discrete((a, b, c, d), period, method="zoh")
-    state, memory = np.array([0.3, -1.0]), FilterMemory(np.array(0.3), np.array(-1.0))
+    state, memory = np.array([0.3, -1.0]), FilterState(np.array(0.3), np.array(-1.0))
     for u in np.random.default_rng(12).normal(size=20):
         state = system[0] @ state + system[1][:, 0] * u
         memory = second_order(memory, np.array(u), natural, damping, period)
@@ -601,7 +601,7 @@ def test_second_order_is_exact_for_a_held_input(damping, natural, period):
 
 @given(inputs=st.lists(st.floats(-1, 1), min_size=5, max_size=40), natural=st.floats(0.1, 300.0))
 def test_critically_damped_output_stays_among_its_inputs(inputs, natural):
-    memory = FilterMemory(np.array(inputs[0]), np.array(0.0))
+    memory = FilterState(np.array(inputs[0]), np.array(0.0))
     for u in inputs:
         memory = second_order(memory, np.array(u), natural, 1.0, 0.015)
         assert min(inputs) - 1e-12 <= memory.value <= max(inputs) + 1e-12

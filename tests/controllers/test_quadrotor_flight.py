@@ -13,9 +13,9 @@ import artde_gym  # noqa: F401  # registers the environment
 import controllers
 from artde_gym.robots.q450 import model as q450
 from controllers.law_table import LAWS, Nothing
-from controllers.laws.cascade import CascadeGains, Flight, cascade, cascade_start
+from controllers.laws.cascade import CascadeGains, QuadrotorInput, cascade, cascade_init
 from controllers.laws.tde import TdeGains
-from controllers.laws.tracking import Array, Law, Memory, Signals
+from controllers.laws.tracking import Array, JointInput, Law, LawState
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 PERIOD = 0.015
@@ -26,10 +26,10 @@ class Judge:
     """One rigid quadrotor, integrated by Runge and Kutta in short steps.
 
     Args:
-        mass, inertia, com: of the whole body, about its centre of mass, which lies at `com` in the body frame.
+        mass, inertia, com: of the whole body, about its center of mass, which lies at `com` in the body frame.
         lag: of the rotors (s); 0 for none.
         drag: N s/m.
-        force: of the world on the centre of mass (N), a function of time.
+        force: of the world on the center of mass (N), a function of time.
         torque: likewise (Nm, body axes).
     """
 
@@ -48,9 +48,9 @@ class Judge:
         self.inertia = np.diag(q450.INERTIA) if inertia is None else np.array(inertia)
         self.force, self.torque, self.substeps = force, torque, substeps
         self.time = 0.0
-        weight = np.array([0.0, 0.0, mass * 9.81])  # hover: the thrust's line passes through the centre of mass
+        weight = np.array([0.0, 0.0, mass * 9.81])  # hover: the thrust's line passes through the center of mass
         self.rotors = q450.ALLOCATION @ np.array([weight[2], *np.cross(self.com, weight)])
-        self.position, self.velocity = np.zeros(3), np.zeros(3)  # of the centre of mass
+        self.position, self.velocity = np.zeros(3), np.zeros(3)  # of the center of mass
         self.rot, self.rates = np.eye(3), np.zeros(3)
 
     def place(
@@ -180,7 +180,7 @@ def test_the_judge_conserves_momentum_and_energy_when_nothing_acts():
     np.testing.assert_allclose(judge.position, [3.0, 6.0, 9.0 - 9.81 * 4.5], rtol=1e-12)
 
 
-def test_the_judge_hovers_with_a_payload_off_centre():
+def test_the_judge_hovers_with_a_payload_off_center():
     judge = Judge(mass=1.83, com=(0.002, -0.001, -0.02))
     judge.place((0.0, 0.0, 1.0))
     for _ in range(100):
@@ -194,7 +194,7 @@ def test_the_judge_hovers_with_a_payload_off_centre():
 def hover_law(force: Any) -> Law:
     """A position law that always wants the same force."""
 
-    def step(gains: Any, memory: Memory, signals: Signals, period: float) -> tuple[Array, Memory]:
+    def step(gains: Any, memory: LawState, signals: JointInput, period: float) -> tuple[Array, LawState]:
         return np.array(force), memory
 
     return Law(lambda gains, signals, period: Nothing(), step)
@@ -207,7 +207,7 @@ def constant(vector: Any) -> Callable[[float], np.ndarray]:
 class Sample(NamedTuple):
     """What the law saw and left."""
 
-    signals: Signals
+    signals: JointInput
     memory: Any
 
 
@@ -216,7 +216,7 @@ def loop(judge: Judge, position: Law, gains: CascadeGains, samples: int, which: 
     seen: list[Sample] = []
 
     def noting(law: Law) -> Law:
-        def step(gains: Any, memory: Any, signals: Signals, period: float) -> tuple[Array, Memory]:
+        def step(gains: Any, memory: Any, signals: JointInput, period: float) -> tuple[Array, LawState]:
             force, memory = law.step(gains, memory, signals, period)
             seen.append(Sample(signals, memory))
             return force, memory
@@ -227,7 +227,7 @@ def loop(judge: Judge, position: Law, gains: CascadeGains, samples: int, which: 
     wrench, memory, zero = q450.MIXER @ judge.rotors, None, np.zeros(3)
     for _ in range(samples):
         axes: Any = tuple(tuple(judge.rot[:, i]) for i in range(3))
-        now = Flight(
+        now = QuadrotorInput(
             *judge.origin[:2],
             axes,
             judge.rates,
@@ -241,7 +241,7 @@ def loop(judge: Judge, position: Law, gains: CascadeGains, samples: int, which: 
             wrench[1:],
         )
         if memory is None:
-            memory = cascade_start(outer, inner, gains, now, PERIOD)
+            memory = cascade_init(outer, inner, gains, now, PERIOD)
         command, memory = cascade(outer, inner, gains, memory, now, PERIOD)
         wrench = judge.hold(command)
     return seen

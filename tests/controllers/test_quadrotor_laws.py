@@ -14,12 +14,12 @@ from scipy.spatial.transform import Rotation
 from controllers.law_table import LAWS
 from controllers.laws import cascade as cascade_module
 from controllers.laws.attitude import attitude_error, desired_axes, desired_rates, heading
-from controllers.laws.cascade import CascadeGains, Flight, cascade, cascade_start
+from controllers.laws.cascade import CascadeGains, QuadrotorInput, cascade, cascade_init
 from controllers.laws.errors import GainError
 from controllers.laws.positional_pid import PositionalPidGains
 from controllers.laws.rigid_attitude import RigidAttitudeGains, rigid_attitude
 from controllers.laws.tde import TdeGains
-from controllers.laws.tracking import Array, Law, Memory, Signals, components
+from controllers.laws.tracking import Array, JointInput, Law, LawState, components
 from controllers.laws.vectors import joined, to_body, to_world
 
 PERIOD = 0.015
@@ -125,7 +125,7 @@ def test_rigid_attitude_is_equation_16_of_lee():
     actual, desired = random_rotations(9, 1)[0].as_matrix(), random_rotations(10, 1)[0].as_matrix()
     rates, rates_ref, turning = np.random.default_rng(11).normal(size=(3, 3))
     across = actual.T @ desired
-    signals = Signals(
+    signals = JointInput(
         -0.5 * vee(across - across.T),
         rates,
         np.zeros(3),
@@ -149,33 +149,33 @@ def tde_gains(**options: Any) -> CascadeGains:
     return CascadeGains(TdeGains(1.0, **THESIS), TdeGains(0.015, **THESIS), **{**LIMITS, **options})
 
 
-def flight(*batch: int, seed: int = 12, **given: Any) -> Flight:
+def flight(*batch: int, seed: int = 12, **given: Any) -> QuadrotorInput:
     """A random but plausible sample; `given` replaces parts of it."""
     rng = np.random.default_rng(seed)
     vector = (*batch, 3)
     rotation = Rotation.from_rotvec(rng.normal(scale=0.2, size=(math.prod(batch), 3))).as_matrix()
-    parts = {name: rng.normal(scale=0.1, size=vector) for name in Flight._fields if name != "axes"}
+    parts = {name: rng.normal(scale=0.1, size=vector) for name in QuadrotorInput._fields if name != "axes"}
     parts |= {name: rng.normal(scale=0.3, size=batch) for name in ("yaw_ref", "yaw_rate_ref")}
     parts["thrust_applied"] = 15.0 + rng.normal(size=batch)
     parts["axes"] = axes_of(rotation.reshape(*batch, 3, 3))
-    return Flight(**{**parts, **given})
+    return QuadrotorInput(**{**parts, **given})
 
 
 LEVEL = axes_of(np.eye(3))
 
 
-def at_rest(**given: Any) -> Flight:
+def at_rest(**given: Any) -> QuadrotorInput:
     """Hover at the origin, level, where the reference wants it."""
     zero = np.zeros(3)
-    parts: dict[str, Any] = dict.fromkeys(Flight._fields, zero)
+    parts: dict[str, Any] = dict.fromkeys(QuadrotorInput._fields, zero)
     parts |= {"axes": LEVEL, "yaw_ref": np.float64(0), "yaw_rate_ref": np.float64(0), "thrust_applied": np.float64(15)}
-    return Flight(**{**parts, **given})
+    return QuadrotorInput(**{**parts, **given})
 
 
-def spy(law: Law, seen: list[Signals]) -> Law:
+def spy(law: Law, seen: list[JointInput]) -> Law:
     """The same law, which notes what it is shown."""
 
-    def step(gains: Any, memory: Any, signals: Signals, period: float) -> tuple[Array, Memory]:
+    def step(gains: Any, memory: Any, signals: JointInput, period: float) -> tuple[Array, LawState]:
         seen.append(signals)
         return law.step(gains, memory, signals, period)
 
@@ -184,15 +184,15 @@ def spy(law: Law, seen: list[Signals]) -> Law:
 
 def test_hover_asks_for_what_acts():
     still = at_rest(torque_applied=np.array([0.1, -0.2, 0.05]))
-    wrench, memory = cascade(TDE, TDE, tde_gains(), cascade_start(TDE, TDE, tde_gains(), still, PERIOD), still, PERIOD)
+    wrench, memory = cascade(TDE, TDE, tde_gains(), cascade_init(TDE, TDE, tde_gains(), still, PERIOD), still, PERIOD)
     np.testing.assert_allclose(wrench, [15.0, 0.1, -0.2, 0.05], atol=1e-12)
     np.testing.assert_allclose(memory.force, [0.0, 0.0, 15.0], atol=1e-12)
 
 
 def test_a_step_by_hand():
     gains, period = tde_gains(), 0.1
-    start = cascade_start(TDE, TDE, gains, at_rest(), period)
-    # pitched by atan(3/4) with u1 = 10 N, half a metre behind, 0.2 m/s too fast
+    start = cascade_init(TDE, TDE, gains, at_rest(), period)
+    # pitched by atan(3/4) with u1 = 10 N, half a meter behind, 0.2 m/s too fast
     tilted = at_rest(
         axes=axes_of([[0.8, 0.0, 0.6], [0.0, 1.0, 0.0], [-0.6, 0.0, 0.8]]),
         position_ref=np.array([0.5, 0.0, 0.0]),
@@ -220,9 +220,9 @@ def test_a_step_by_hand():
 
 
 def test_what_the_attitude_law_sees():
-    seen: list[Signals] = []
+    seen: list[JointInput] = []
     gains, now, rng = tde_gains(), flight(4), np.random.default_rng(13)
-    memory = cascade_start(TDE, TDE, gains, now, PERIOD)
+    memory = cascade_init(TDE, TDE, gains, now, PERIOD)
     memory = memory._replace(command=memory.command._replace(rate=rng.normal(scale=20.0, size=(4, 3))))
     axes_ref, rates_ref = cascade_module._attitude_command(memory.command, now, 0.0)
     _, after = cascade(TDE, spy(TDE, seen), gains, memory, now, PERIOD)
@@ -258,7 +258,7 @@ def test_desired_rates_and_accelerations_are_those_of_the_desired_attitude(comma
             thrust_applied=np.float64(1.48 * 9.81),
         )
         if memory is None:
-            memory = cascade_start(law, TDE, gains, now, period)
+            memory = cascade_init(law, TDE, gains, now, period)
         _, memory = cascade(law, spy(TDE, seen), gains, memory, now, period)
         axes.append(matrix_of(memory.axes_ref))
     desired = Rotation.from_matrix(np.array(axes))
@@ -278,7 +278,7 @@ def test_desired_rates_and_accelerations_are_those_of_the_desired_attitude(comma
 def test_the_force_stays_within_reach(wish):
     gains = tde_gains()
     now = at_rest(position_ref=np.array(wish))
-    memory = cascade_start(TDE, TDE, gains, now, PERIOD)
+    memory = cascade_init(TDE, TDE, gains, now, PERIOD)
     for _ in range(100):
         wrench, memory = cascade(TDE, TDE, gains, memory, now, PERIOD)
         x, y, lift = memory.force
@@ -293,18 +293,18 @@ def test_the_force_stays_within_reach(wish):
 
 def test_a_force_within_reach_is_left_alone():
     now = at_rest(position_ref=np.array([0.2, -0.1, 0.1]))
-    _, memory = cascade(TDE, TDE, tde_gains(), cascade_start(TDE, TDE, tde_gains(), now, PERIOD), now, PERIOD)
+    _, memory = cascade(TDE, TDE, tde_gains(), cascade_init(TDE, TDE, tde_gains(), now, PERIOD), now, PERIOD)
     np.testing.assert_allclose(memory.force, [2.0, -1.0, 16.0], rtol=1e-14)
 
 
 def test_the_printed_error_is_that_of_the_thesis():
     actual = random_rotations(14, 1, scale=0.3)[0].as_matrix()
     now = flight(axes=axes_of(actual), rates=np.array([0.3, -0.2, 0.1]))
-    memory = cascade_start(TDE, TDE, tde_gains(), now, PERIOD)
+    memory = cascade_init(TDE, TDE, tde_gains(), now, PERIOD)
     memory = memory._replace(command=memory.command._replace(rate=np.array([5.0, -3.0, 1.0])))
     axes_ref, rates_ref = cascade_module._attitude_command(memory.command, now, 0.0)
     desired = matrix_of(axes_ref)
-    seen: list[Signals] = []
+    seen: list[JointInput] = []
     for sign in ("desired", "printed"):
         cascade(TDE, spy(TDE, seen), tde_gains(attitude_error=sign), memory, now, PERIOD)
     ours, printed = seen

@@ -63,7 +63,7 @@ def test_a_policy_files_recipe_overrides_gains_alone(env, tmp_path):
     (tmp_path / DESCRIPTION).write_text(json.dumps(description))
     with pytest.raises(ArtdeGymError, match=NO_GAIN):
         baselines.load(tmp_path, env)
-    save(tmp_path, saved._replace(recipe=dataclasses.replace(saved.recipe, gains={"k_p_p": 9.0})))
+    save(tmp_path, saved._replace(config=dataclasses.replace(saved.config, gains={"k_p_p": 9.0})))
     baselines.load(tmp_path, env)
 
 
@@ -108,9 +108,9 @@ def test_what_is_no_controller_is_told_in_words(env, registry, tmp_path, point, 
 
 
 def test_a_search_space_that_cannot_be_imported_is_told_in_words(env, registry):
-    artde_gym.register_controller("own", "own_things:make", search="no_such_module:space")
+    artde_gym.register_controller("own", "own_things:make", tuning_space="no_such_module:space")
     with pytest.raises(UnknownNameError, match="entry point of 'own' is 'no_such_module:space'"):
-        registration.search_space("own", env)
+        registration.tuning_space("own", env)
 
 
 @pytest.mark.parametrize("point", ["module", "a:b:c", ":make", "module:", ":", "", 3])

@@ -11,7 +11,7 @@ import pytest
 import artde_gym  # noqa: F401  (registers the environments)
 import controllers
 from artde_gym.errors import OptionError
-from artde_gym.registration import search_space
+from artde_gym.registration import tuning_space
 from artde_gym.robots.q450.sling import OBSERVATION
 from controllers.laws.errors import GainError
 from controllers.laws.swing import Cable, swing_gains, swing_term
@@ -100,7 +100,7 @@ def test_gains_are_checked_and_tuned() -> None:
         controllers.make("geometric-load", env, load_k_d_p=0.0)
     assert controllers.make("tde+swing", env, preset="slung").gains.position.m_bar == 1.6
     for name in SLUNG:
-        for gain in search_space(name, env).values():
+        for gain in tuning_space(name, env).values():
             assert gain.low <= gain.start <= gain.high
 
 

@@ -12,8 +12,8 @@ import pytest
 import artde_gym  # noqa: F401  (registers the environments)
 import controllers
 from controllers import GainError
-from controllers.laws.tde import TdeGains, tde, tde_start
-from controllers.laws.tracking import Signals
+from controllers.laws.tde import TdeGains, tde, tde_init
+from controllers.laws.tracking import JointInput
 
 LAWS = ("tde", "atde", "artde", "pid", "tde+c", "tde+kd")
 
@@ -54,8 +54,8 @@ def test_a_short_time_base_leaves_an_error_driven_by_the_reference() -> None:
     errors, times = [], period * np.arange(24000)
     for t in times:
         reference = math.sin(rate * t), rate * math.cos(rate * t), -(rate**2) * math.sin(rate * t)
-        signals = Signals(*(np.array([value]) for value in (q, qd, *reference, tau)))
-        memory = memory or tde_start(signals, period / ratio)
+        signals = JointInput(*(np.array([value]) for value in (q, qd, *reference, tau)))
+        memory = memory or tde_init(signals, period / ratio)
         force, memory = tde(gains, memory, signals, period / ratio)
         errors.append(reference[0] - q)
         tau = float(force[0])

@@ -108,15 +108,15 @@ def _leg(side: str) -> tuple[Link, ...]:
     name = {joint: f"{side}_{joint}" for joint in LEG_JOINTS}
     thigh: Vector = (0.08, 0.07, THIGH)
     shank: Vector = (0.07, 0.06, SHANK)
-    foot_centre: Vector = (FOOT_CENTRE_AHEAD, 0.0, -ANKLE_HEIGHT + FOOT_SIZE[2] / 2)
-    foot = box_link(name["ankle_roll"], 0.25, FOOT_SIZE, foot_centre, name["ankle_pitch"], axis=_X, collides=True)
+    foot_center: Vector = (FOOT_CENTRE_AHEAD, 0.0, -ANKLE_HEIGHT + FOOT_SIZE[2] / 2)
+    foot = box_link(name["ankle_roll"], 0.25, FOOT_SIZE, foot_center, name["ankle_pitch"], axis=_X, collides=True)
     return (
         box_link(name["hip_yaw"], 0.20, (0.06, 0.06, 0.06), (0.0, 0.0, 0.0), "torso", (0.0, y, 0.0), _Z),
         box_link(name["hip_roll"], 0.25, (0.06, 0.06, 0.06), (0.0, 0.0, 0.0), name["hip_yaw"], axis=_X),
         box_link(name["hip_pitch"], 0.75, thigh, (0.0, 0.0, -THIGH / 2), name["hip_roll"], axis=_Y),
         box_link(name["knee"], 0.50, shank, (0.0, 0.0, -SHANK / 2), name["hip_pitch"], (0.0, 0.0, -THIGH), _Y),
         box_link(name["ankle_pitch"], 0.20, (0.05, 0.05, 0.05), (0.0, 0.0, 0.0), name["knee"], (0.0, 0.0, -SHANK), _Y),
-        dataclasses.replace(foot, visuals=(Box(FOOT_SIZE, foot_centre, _DARK),)),
+        dataclasses.replace(foot, visuals=(Box(FOOT_SIZE, foot_center, _DARK),)),
     )
 
 

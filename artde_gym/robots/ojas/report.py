@@ -11,7 +11,7 @@ import numpy as np
 
 from artde_gym.arrays import Array
 from artde_gym.multibody.dynamics import RigidBodyTree
-from artde_gym.palette import OTHERS, Look, looks
+from artde_gym.palette import OTHERS, Style, styles
 from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.diagram import Block, diagram
 from artde_gym.report.html import figure, paragraph
@@ -21,8 +21,8 @@ from artde_gym.robots.ojas.model import ojas
 from artde_gym.robots.ojas.walking import walking_pattern
 
 SHOWN = 10.0  # s of the walk, from its start
-SIDES: dict[str, Look] = {"left": OTHERS[3], "right": OTHERS[4]}
-BODY = {"centre of mass": OTHERS[2], **{f"{side} foot": look for side, look in SIDES.items()}}
+SIDES: dict[str, Style] = {"left": OTHERS[3], "right": OTHERS[4]}
+BODY = {"center of mass": OTHERS[2], **{f"{side} foot": look for side, look in SIDES.items()}}
 PERIOD = 0.001  # s, of the pattern in the environment
 
 
@@ -67,16 +67,16 @@ def reference(kwargs: Mapping[str, Any]) -> dict[str, list[str]]:
 
 
 def _pattern(arguments: Mapping[str, Any]) -> list[str]:
-    """What the pattern wants of the centre of mass, the feet and the joints."""
+    """What the pattern wants of the center of mass, the feet and the joints."""
     pattern = walking_pattern(**arguments, period=PERIOD)
     part = slice(0, round(SHOWN / PERIOD), 10)
     time = PERIOD * np.arange(len(pattern.q))[part]
     com = pattern.base[part] + RigidBodyTree(ojas("none")).center_of_mass(pattern.q[part])
-    paths = {"centre of mass": com, "left foot": pattern.feet[part, 0], "right foot": pattern.feet[part, 1]}
+    paths = {"center of mass": com, "left foot": pattern.feet[part, 0], "right foot": pattern.feet[part, 1]}
     trajectories = {}
     for i, axis in enumerate("xyz"):
         chart = _chart(
-            f"Desired {axis} of centre of mass and feet", f"{axis} (m)", time, [p[:, i] for p in paths.values()]
+            f"Desired {axis} of center of mass and feet", f"{axis} (m)", time, [p[:, i] for p in paths.values()]
         )
         for name, path in paths.items():
             chart.line(time, path[:, i], BODY[name], text=name)
@@ -90,7 +90,7 @@ def _pattern(arguments: Mapping[str, Any]) -> list[str]:
         joints[f"q{i + 1}"] = chart.svg()
     first = f"the first {min(SHOWN, float(time[-1])):.0f} s"
     return [
-        figure(f"Desired trajectories of the centre of mass and the ankles, {first}.", trajectories, BODY),
+        figure(f"Desired trajectories of the center of mass and the ankles, {first}.", trajectories, BODY),
         figure(f"Desired joint trajectories of both legs, {first}.", joints, SIDES),
     ]
 
@@ -127,7 +127,7 @@ def _tilt(episode: Episode) -> str:
     chart = over_time(episode, "Tilt of the torso", "tilt (deg)", list(tilts.values()), zero=True)
     for name, tilt in tilts.items():
         add(chart, episode.signals[name], tilt, name)
-    return figure(f"Tilt of the torso, episode {episode.number}.", {"": chart.svg()}, looks(episode.signals))
+    return figure(f"Tilt of the torso, episode {episode.number}.", {"": chart.svg()}, styles(episode.signals))
 
 
 def _chart(name: str, label: str, time: Array, columns: list[Array]) -> Chart:

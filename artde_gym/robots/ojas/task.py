@@ -9,13 +9,14 @@ from typing import Any, Literal, TypeVar, get_args
 
 import numpy as np
 
-from artde_gym.arguments import flag, steps_per_period, word
+from artde_gym.arguments import check_bool, check_choice, steps_per_period
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.ground import GrfPulses
 from artde_gym.disturbances.numeric import Words
 from artde_gym.errors import DisturbanceError
 from artde_gym.layout import Field, Layout
+from artde_gym.metrics_spec import EffortSignal, MetricsSpec, TrackedSignal
 from artde_gym.multibody.dynamics import GRAVITY
 from artde_gym.multibody.spec import RobotSpec, Vector
 from artde_gym.multibody.support import Supported
@@ -23,7 +24,6 @@ from artde_gym.robots.ojas import model as robot
 from artde_gym.robots.ojas.model import ActuatorInertia, ojas
 from artde_gym.robots.ojas.walking import WalkingPattern, hip_height_above_ankle, walking_pattern
 from artde_gym.sim.engine import World
-from artde_gym.tracking import Effort, Tracked, Tracking
 
 Arms = Literal["fixed", "revolute"]
 
@@ -72,17 +72,17 @@ ACTION = Layout(
 )
 
 _RIGHT_LEG = {f"q{i + 1}": N_JOINTS // 2 + i for i in range(N_JOINTS // 2)}  # what the thesis' tables show
-TRACKING = Tracking(
-    errors=(Tracked("deg", 180.0 / math.pi, _RIGHT_LEG, lambda fields: fields["q_ref"] - fields["q"]),),
+METRICS_SPEC = MetricsSpec(
+    errors=(TrackedSignal("deg", 180.0 / math.pi, _RIGHT_LEG, lambda fields: fields["q_ref"] - fields["q"]),),
     norm=False,
-    band=math.radians(0.5),
-    efforts=(Effort("torque", "nm", "tau_applied", slice(N_JOINTS), _RIGHT_LEG),),
+    settling_band=math.radians(0.5),
+    efforts=(EffortSignal("torque", "nm", "tau_applied", slice(N_JOINTS), _RIGHT_LEG),),
     power=lambda fields: np.abs(fields["tau_applied"] * fields["qd"]).sum(axis=-1),
-    limited="tau_applied",
-    near=0.0,
+    saturated_field="tau_applied",
+    saturation_margin=0.0,
     tde_errors={"tde_error_rms": "sigma"},
-    means={"robust_gain_mean": "c"},
-    told=("foot_loads",),
+    diagnostic_means={"robust_gain_mean": "c"},
+    recorded_info=("foot_loads",),
     speed=lambda fields: fields["base_velocity"][..., 0],
 )
 
@@ -187,10 +187,10 @@ class Walk:
         Raises:
             OptionError: for an argument out of range.
         """
-        word("actuator_inertia", actuator_inertia, get_args(ActuatorInertia))
-        word("arms", arms, get_args(Arms))
+        check_choice("actuator_inertia", actuator_inertia, get_args(ActuatorInertia))
+        check_choice("arms", arms, get_args(Arms))
         nominal = ojas(actuator_inertia)
-        collide = flag("self_collision", self_collision)
+        collide = check_bool("self_collision", self_collision)
         model = dataclasses.replace(ojas(actuator_inertia, arms=arms), feet_collide=collide)
         substeps = steps_per_period(control_period, TIME_STEP)
         pattern = walking_pattern(speed, step_duration, duration, TIME_STEP)
@@ -237,20 +237,20 @@ class Walk:
             raise DisturbanceError("disturbances", "rotor_inertia", allowed)
         return parsed
 
-    def set_up(self, world: World, realised: Mapping[str, Any]) -> None:
+    def set_up(self, world: World, sampled: Mapping[str, Any]) -> None:
         """Give a world what was drawn for it, the payload excepted."""
-        world.set_friction(realised.get("friction", {}).get("coefficient", FRICTION))
-        world.set_gravity(gravity(**realised.get("slope", {})))
-        factor = realised.get("mass_error", {}).get("factor", 1.0)
-        rotors = realised.get("rotor_inertia", {}).get("inertia", robot.ARMATURE) / robot.ARMATURE
-        world.scale_masses(factor, self._mass_factors(realised), rotors)
-        world.set_contact_time(realised.get("contact", {}).get("time_constant"))
+        world.set_friction(sampled.get("friction", {}).get("coefficient", FRICTION))
+        world.set_gravity(gravity(**sampled.get("slope", {})))
+        factor = sampled.get("mass_scale", {}).get("factor", 1.0)
+        rotors = sampled.get("rotor_inertia", {}).get("inertia", robot.ARMATURE) / robot.ARMATURE
+        world.scale_masses(factor, self._mass_factors(sampled), rotors)
+        world.set_contact_time(sampled.get("contact", {}).get("time_constant"))
 
-    def _mass_factors(self, realised: Mapping[str, Any]) -> dict[str, float]:
+    def _mass_factors(self, sampled: Mapping[str, Any]) -> dict[str, float]:
         """Factors of the masses of links, by name: legs of another mass, and the rest of the robot makes up for it."""
-        if "mass_distribution" not in realised:
+        if "mass_distribution" not in sampled:
             return {}
-        legs = realised["mass_distribution"]["legs"]
+        legs = sampled["mass_distribution"]["legs"]
         masses = {link.name: link.mass for link in self.robot.links}
         of_legs = math.fsum(masses[name] for name in self.robot.actuated)
         rest = 1.0 + (1.0 - legs) * of_legs / (math.fsum(masses.values()) - of_legs)
@@ -260,10 +260,10 @@ class Walk:
         """The ground reaction pulses of `n` robots on this walk."""
         return GrfPulses(n, self.pattern.load_left, TIME_STEP)
 
-    def pose(self, realised: Mapping[str, Any]) -> Array:
+    def pose(self, sampled: Mapping[str, Any]) -> Array:
         """Joint angles (12,) (rad) in which the robot is to settle."""
         pose = self.start.copy()
-        for entry in realised.get("initial_pose", ()):
+        for entry in sampled.get("initial_pose", ()):
             pose[self.nominal_robot.actuated.index(entry["joint"])] += entry["offset"]
         return pose
 
@@ -276,18 +276,18 @@ class Walk:
         return self.stand + SETTLE_STIFFNESS * (pose - q) - self.damping * qd
 
 
-def torque_limit(realised: Mapping[str, Any]) -> float:
+def torque_limit(sampled: Mapping[str, Any]) -> float:
     """The largest torque (Nm) of a joint with what was drawn."""
-    return realised.get("torque_limit", {}).get("limit", robot.TORQUE_LIMIT)
+    return sampled.get("torque_limit", {}).get("limit", robot.TORQUE_LIMIT)
 
 
-def settling(realised: Mapping[str, Any]) -> int:
+def settling(sampled: Mapping[str, Any]) -> int:
     """Time steps that a robot at rest on level ground needs to come to rest again with what was drawn."""
-    if not realised.keys().isdisjoint(("slope", "initial_pose")):
+    if not sampled.keys().isdisjoint(("slope", "initial_pose")):
         return SETTLE_POSE_STEPS
     return (
         0
-        if realised.keys().isdisjoint(("payload", "friction", "mass_error", "mass_distribution", "contact"))
+        if sampled.keys().isdisjoint(("payload", "friction", "mass_scale", "mass_distribution", "contact"))
         else SETTLE_STEPS
     )
 

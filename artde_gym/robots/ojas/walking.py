@@ -2,7 +2,7 @@
 
 1. Footholds and a zero-moment-point (ZMP) reference: on the middle of the supporting foot, moved by a quintic during
    double support.
-2. The centre of mass c of the linear inverted pendulum under that reference, c - (z/g) c'' = p with c = p at both
+2. The center of mass c of the linear inverted pendulum under that reference, c - (z/g) c'' = p with c = p at both
    ends: a tridiagonal boundary value problem.
 3. Multibody correction: the ZMP of the whole robot by inverse dynamics, its error through the same boundary value
    problem, the base moved by the result; a few passes.
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline, make_interp_spline
 from scipy.linalg import solve_banded
 
-from artde_gym.arguments import number
+from artde_gym.arguments import check_number
 from artde_gym.arrays import Array
 from artde_gym.errors import OptionError
 from artde_gym.multibody.dynamics import GRAVITY, RigidBodyTree
@@ -89,12 +89,12 @@ def walking_pattern(
         OptionError: a speed outside 0 to 0.25 m/s, a step outside 0.6 to 2 s, a step longer than 0.25 m, a walk
             outside 0.1 to 1800 s, or a period outside 1e-6 to 0.1 s.
     """
-    speed = number("speed", speed, 0.0, 0.25, "0 to 0.25 m/s")
-    step_duration = number("step_duration", step_duration, 0.6, 2.0, "0.6 to 2 s")
+    speed = check_number("speed", speed, 0.0, 0.25, "0 to 0.25 m/s")
+    step_duration = check_number("step_duration", step_duration, 0.6, 2.0, "0.6 to 2 s")
     if speed * step_duration > 0.25:
         raise OptionError("speed * step_duration", speed * step_duration, "a step of at most 0.25 m")
-    duration = number("duration", duration, 0.1, LONGEST, f"0.1 to {LONGEST:g} s")
-    period = number("period", period, 1e-6, 0.1, "1e-6 to 0.1 s")
+    duration = check_number("duration", duration, 0.1, LONGEST, f"0.1 to {LONGEST:g} s")
+    period = check_number("period", period, 1e-6, 0.1, "1e-6 to 0.1 s")
     return _pattern(speed, step_duration, duration, period)  # by position: the cache tells names from positions
 
 
@@ -163,7 +163,7 @@ class _Gait:
         return after(step - 1) + (after(step) - after(step - 1)) * _quintic(u / DOUBLE_SUPPORT)
 
     def zmp(self, time: Array) -> Array:
-        """On the line between the foot centres, at the planned share; the feet stand still while it moves."""
+        """On the line between the foot centers, at the planned share; the feet stand still while it moves."""
         step, _ = self._progress(time)
         left, right = (self.foothold(np.array(foot), step) for foot in (0, 1))
         load = self.load_left(time)

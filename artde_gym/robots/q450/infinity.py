@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from artde_gym.arguments import number
+from artde_gym.arguments import check_number
 from artde_gym.arrays import Array
 
 START = (0.0, 0.0, 0.6)  # m
@@ -56,8 +56,8 @@ def infinity_path(duration: float = 70.0, period: float = 0.015) -> InfinityPath
     Raises:
         OptionError: a path outside 0.1 to 7200 s, or a period outside 1e-6 to 0.1 s.
     """
-    duration = number("duration", duration, 0.1, LONGEST, f"0.1 to {LONGEST:g} s")
-    period = number("period", period, 1e-6, 0.1, "1e-6 to 0.1 s")
+    duration = check_number("duration", duration, 0.1, LONGEST, f"0.1 to {LONGEST:g} s")
+    period = check_number("period", period, 1e-6, 0.1, "1e-6 to 0.1 s")
     return _path(duration, period)  # by position: the cache tells names from positions
 
 

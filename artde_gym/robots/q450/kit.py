@@ -27,7 +27,7 @@ def kick(mass: float) -> dict[str, Any]:
 _LOAD: dict[str, Any] = {
     "mass": {"uniform": [0.95 * 0.35, 1.05 * 0.35]},
     "position": [{"uniform": [0.005, 0.015]}, {"uniform": [-0.005, 0.005]}, {"uniform": [-0.105, -0.095]}],
-    "drop": 35.0,
+    "detach_time": 35.0,
 }
 _FLIGHT: dict[str, Any] = {
     "payload": _LOAD,
@@ -40,7 +40,7 @@ _SLUNG: dict[str, Any] = {
         "mass": {"uniform": [0.95 * 0.35, 1.05 * 0.35]},
         "cable": 0.5,
         "position": [{"uniform": [-0.005, 0.005]}] * 2 + [{"uniform": [-0.055, -0.045]}],
-        "drop": 35.0,
+        "detach_time": 35.0,
     },
     "push": [kick(0.35)],
     "initial_position": _FLIGHT["initial_position"],
@@ -55,7 +55,7 @@ _SCENARIOS = (
         "Q-sling",
         _SLING,
         {"duration": 45.0},
-        {**_SLUNG, "wind": {"scale": 1.0, "fan_place": LIFTED_FAN}},
+        {**_SLUNG, "wind": {"scale": 1.0, "fan_position": LIFTED_FAN}},
         "infinity loop with 0.35 kg on a cable of 0.5 m, wind; the load is kicked at 20 s and released at 35 s",
     ),
     Scenario("Q-sling-calm", _SLING, {"duration": 45.0}, _SLUNG, "Q-sling without wind"),
@@ -63,7 +63,7 @@ _SCENARIOS = (
         "Q-sling-gale",
         _SLING,
         {"duration": 45.0},
-        {**_SLUNG, "wind": {"scale": 2.0, "fan_place": LIFTED_FAN}},
+        {**_SLUNG, "wind": {"scale": 2.0, "fan_position": LIFTED_FAN}},
         "Q-sling in wind of twice the strength",
     ),
 )
@@ -75,17 +75,17 @@ _FRONTIER = FrontierTest(
     when=_LOOP,
     repeated={
         "push": [random_push("body", _LOOP)],
-        "actuator_loss": [{"joint": "front_left", "start": {"uniform": list(_LOOP)}}],
+        "actuator_effectiveness": [{"joint": "front_left", "start": {"uniform": list(_LOOP)}}],
     },
     time_step=0.005,
     ranges={
         "wind.scale": Range(0.0, 10.0, 0.25),
         "payload.mass": Range(0.1, 2.0, 0.05),
         "push.magnitude": Range(0.0, 60.0, 2.0),
-        "torque_delay.samples": Range(0.0, 10.0, 1.0),
+        "action_delay.steps": Range(0.0, 10.0, 1.0),
         "motor_lag.time_constant": Range(0.0, 0.2, 0.005),
-        "actuator_loss.factor": Range(0.0, 1.0, 0.05, "smaller"),
-        "mass_error.factor": Range(0.5, 2.0, 0.05),
+        "actuator_effectiveness.factor": Range(0.0, 1.0, 0.05, "smaller"),
+        "mass_scale.factor": Range(0.5, 2.0, 0.05),
         "ground_effect.strength": Range(0.0, 10.0, 0.5),
         "sensor_noise.position": Range(0.0, 0.1, 0.0025),
         "sensor_noise.velocity": Range(0.0, 1.0, 0.025),
@@ -115,7 +115,7 @@ KIT = RobotKit(
         Environment(
             _INFINITY,
             "artde_gym.envs.quadrotor:QuadInfinityPayloadEnv",
-            "artde_gym.envs.quadrotor_batch:QuadInfinityPayloadVectorEnv",
+            "artde_gym.envs.quadrotor_vector:QuadInfinityPayloadVectorEnv",
             main=("Q1", "Q1-calm", "Q1-gale"),
         ),
         Environment(

@@ -1,7 +1,7 @@
 """The quadrotor of the thesis: a Q-450 frame with a computer and a gripper, 1.48 kg.
 
 The thesis gives the frame, 1.4 kg without computer and gripper, and the gripper's 0.03 kg; the rest is ours
-(`docs/deviations.md`). Body frame: at the centre of mass; x forward, y left, z up along the thrust. Four rotors in X
+(`docs/deviations.md`). Body frame: at the center of mass; x forward, y left, z up along the thrust. Four rotors in X
 configuration, counted counter-clockwise from the front left as seen from above; neighbours turn in opposite directions.
 """
 
@@ -18,7 +18,7 @@ from artde_gym.multibody.spec import Box, Link, RobotSpec, Vector
 
 MASS = 1.4 + 0.05 + 0.03  # kg: frame, computer, gripper
 INERTIA: Vector = (0.0125, 0.0125, 0.0225)  # kg m^2
-ARM = 0.225  # m, rotor axis to centre
+ARM = 0.225  # m, rotor axis to center
 ROTOR_RADIUS = 0.127  # m, of a ten inch propeller
 MAX_THRUST = 8.5  # N, of one rotor
 TORQUE_PER_THRUST = 0.016  # m, a rotor's reaction torque over its thrust
@@ -86,7 +86,7 @@ def thrusts(u1: Number, u2: Number, u3: Number, u4: Number) -> tuple[Number, ...
 
 
 def rotor_heights(height: Number, ahead: Number, aside: Number) -> tuple[Number, Number, Number, Number]:
-    """World z of the rotors, elementwise, from that of the centre and those of the body's x and y axes."""
+    """World z of the rotors, elementwise, from that of the center and those of the body's x and y axes."""
     x, y = _SIDE * ahead, _SIDE * aside
     both, apart = x + y, x - y
     return height + both, height - apart, height - both, height + apart
@@ -94,7 +94,7 @@ def rotor_heights(height: Number, ahead: Number, aside: Number) -> tuple[Number,
 
 @functools.cache
 def q450() -> RobotSpec:
-    """The quadrotor as one rigid body that can be pushed at its centre, `body`, and at each rotor."""
+    """The quadrotor as one rigid body that can be pushed at its center, `body`, and at each rotor."""
     body = Link("body", MASS, com=(0.0, 0.0, 0.0), inertia=INERTIA, visuals=_visuals())
     sites = [("body", "body", (0.0, 0.0, 0.0))]
     sites += [(name, "body", place) for name, place in zip(ROTORS, ROTOR_PLACES, strict=True)]
@@ -104,9 +104,9 @@ def q450() -> RobotSpec:
 def _visuals() -> tuple[Box, ...]:
     """Boxes lie along the axes: an arm, at 45 degrees to them, is a row of them; a rotor disc is cut into strips."""
     shapes = [Box((0.11, 0.11, 0.05), (0.0, 0.0, 0.0), _WHITE), Box((0.05, 0.04, 0.03), (0.0, 0.0, -0.04), _DARK)]
-    for (x, y, _), colour in zip(ROTOR_PLACES, (_RED, _DARK, _DARK, _RED), strict=True):  # red is ahead
+    for (x, y, _), color in zip(ROTOR_PLACES, (_RED, _DARK, _DARK, _RED), strict=True):  # red is ahead
         steps = [0.2 + 0.8 * i / 9 for i in range(10)]
-        shapes += [Box((0.026, 0.026, 0.018), (share * x, share * y, 0.0), colour) for share in steps]
+        shapes += [Box((0.026, 0.026, 0.018), (share * x, share * y, 0.0), color) for share in steps]
         shapes.append(Box((0.03, 0.03, 0.04), (x, y, 0.01), _DARK))
         for i in range(STRIPS):
             aside = ROTOR_RADIUS * ((2 * i + 1) / STRIPS - 1)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from artde_gym.arrays import Array
-from artde_gym.palette import looks
+from artde_gym.palette import styles
 from artde_gym.report.chart import Axis, Chart, height_of
 from artde_gym.report.diagram import Block, diagram
 from artde_gym.report.html import figure
@@ -61,7 +61,7 @@ def reference(_kwargs: Mapping[str, Any]) -> dict[str, list[str]]:
 
 def figures(episode: Episode) -> list[str]:
     """The infinity path in three dimensions and its projections."""
-    shown = looks(episode.signals)
+    shown = styles(episode.signals)
     paths = {name: signals.fields["position"][::STRIDE] for name, signals in episode.signals.items()}
     longest = max(episode.signals.values(), key=lambda signals: len(signals.time))
     wanted = longest.fields["position_ref"][::STRIDE]
@@ -81,7 +81,7 @@ def figures(episode: Episode) -> list[str]:
 
 def _load(episode: Episode) -> list[str]:
     """Swing, error and impulses of a load on a cable, where there is one."""
-    shown = looks(episode.signals)
+    shown = styles(episode.signals)
     charts: dict[str, str] = {}
     for field, (title, scale) in LOAD.items():
         lines = {
@@ -134,7 +134,7 @@ def _space(paths: dict[str, Array], wanted: Array) -> str:
     shadow = wanted * [1.0, 1.0, 0.0]
     across, up = _seen(shadow).T
     chart.guide(across, up)
-    shown = looks(paths)
+    shown = styles(paths)
     for name, path in paths.items():
         across, up = _seen(path).T
         chart.line(across, up, shown[name], text=name, kind="path")

@@ -18,7 +18,7 @@ class Rotors:
     """The four rotors of one vehicle during one episode.
 
     Args:
-        realised: drawn disturbances, of which "torque_delay", "actuator_loss" and "motor_lag" matter here.
+        sampled: drawn disturbances, of which "action_delay", "actuator_effectiveness" and "motor_lag" matter here.
         thrusts: with which they turn at the start (N), as they did for ever before.
         time_step: of the physics (s).
         steps: of the physics in a control period.
@@ -27,9 +27,9 @@ class Rotors:
         thrusts: now (4,) (N).
     """
 
-    def __init__(self, realised: Mapping[str, Any], thrusts: Sequence[float], time_step: float, steps: int) -> None:
+    def __init__(self, sampled: Mapping[str, Any], thrusts: Sequence[float], time_step: float, steps: int) -> None:
         self.thrusts = np.array(thrusts)
-        constant = realised.get("motor_lag", {}).get("time_constant", robot.ROTOR_LAG)
+        constant = sampled.get("motor_lag", {}).get("time_constant", robot.ROTOR_LAG)
         self._mean = lag_shares(constant, time_step)[1]
         self._ends = np.array(
             [[lag_shares(constant, step * time_step)[0] if step else 0.0] for step in range(steps + 1)]
@@ -37,9 +37,9 @@ class Rotors:
         self._steps = steps
         self._losses = [
             (round(loss["start"] / time_step), robot.ROTORS.index(loss["joint"]), loss["factor"])
-            for loss in realised.get("actuator_loss", ())
+            for loss in sampled.get("actuator_effectiveness", ())
         ]
-        self._late = deque([self.thrusts] * realised.get("torque_delay", {}).get("samples", 0))
+        self._late = deque([self.thrusts] * sampled.get("action_delay", {}).get("steps", 0))
 
     def advance(self, wrench: Sequence[float], first: int) -> Array:
         """Mean thrusts (steps, 4) (N) over each physics step of a control period.

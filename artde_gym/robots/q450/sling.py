@@ -15,14 +15,14 @@ import numpy as np
 
 from artde_gym.arrays import Array
 from artde_gym.layout import Field, Layout
+from artde_gym.metrics_spec import Fields, Watched
 from artde_gym.robots.q450 import task
 from artde_gym.robots.q450.infinity import LIFT, LIFTED_FAN
 from artde_gym.sim.engine import PAYLOAD_RADIUS
-from artde_gym.tracking import Fields, Watched
 
 DEFAULT_DISTURBANCES: dict[str, Any] = {
-    "payload": {"mass": 0.35, "cable": 0.5, "drop": 35.0},
-    "wind": {"scale": 1.0, "fan_place": LIFTED_FAN},
+    "payload": {"mass": 0.35, "cable": 0.5, "detach_time": 35.0},
+    "wind": {"scale": 1.0, "fan_position": LIFTED_FAN},
 }
 
 OBSERVATION = Layout(
@@ -47,8 +47,8 @@ def _while_hanging(name: str) -> Callable[[Fields], Array]:
     return lambda fields: np.where(fields["load_hangs"] > 0.5, fields[name], np.nan)
 
 
-TRACKING = dataclasses.replace(
-    task.TRACKING,
+METRICS_SPEC = dataclasses.replace(
+    task.METRICS_SPEC,
     told=TOLD,
     watched=(
         Watched("swing", "deg", 180.0 / math.pi, _while_hanging("swing"), math.radians(3.0)),

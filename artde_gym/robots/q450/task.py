@@ -16,14 +16,18 @@ from artde_gym.disturbances.numeric import Words
 from artde_gym.disturbances.wind import GRID
 from artde_gym.kit import PAYLOAD
 from artde_gym.layout import Field, Layout
+from artde_gym.metrics_spec import EffortSignal, Fields, MetricsSpec, TrackedSignal
 from artde_gym.multibody.dynamics import GRAVITY
 from artde_gym.multibody.spec import Vector
 from artde_gym.robots.q450 import model as robot
 from artde_gym.robots.q450.infinity import START, infinity_path
-from artde_gym.tracking import Effort, Fields, Tracked, Tracking
 
 STREAMS = 3  # of noise in an episode: wind, motion capture, sensor noise
-DEFAULT_DISTURBANCES: dict[str, Any] = {"payload": {"mass": 0.35, "drop": 35.0}, "wind": 1.0, "ground_effect": 1.0}
+DEFAULT_DISTURBANCES: dict[str, Any] = {
+    "payload": {"mass": 0.35, "detach_time": 35.0},
+    "wind": 1.0,
+    "ground_effect": 1.0,
+}
 
 VOLUME = 3.0  # m, of flight: to either side of the start, and above the ground
 TUMBLING = 30.0  # rad/s, rate of turning that is out of bounds too
@@ -33,7 +37,7 @@ MAX_SPEED = 100.0  # m/s, likewise
 
 OBSERVATION = Layout(
     (
-        Field("position", 3, "m", -10.0, 10.0, "vehicle's centre of mass without payload, world axes"),
+        Field("position", 3, "m", -10.0, 10.0, "vehicle's center of mass without payload, world axes"),
         Field("velocity", 3, "m/s", -MAX_SPEED, MAX_SPEED, "of that point, world axes"),
         Field("rot_body_to_world", 9, "1", -1.01, 1.01, "rotation matrix R, row by row"),
         Field("body_rates", 3, "rad/s", -MAX_RATE, MAX_RATE, "angular velocity, body axes"),
@@ -91,22 +95,24 @@ def _induced_power(fields: Fields) -> Array:
     return (thrust * np.sqrt(thrust)).sum(axis=-1) / math.sqrt(2.0 * AIR_DENSITY * disc)
 
 
-TRACKING = Tracking(
+METRICS_SPEC = MetricsSpec(
     errors=(
-        Tracked("m", 1.0, {"x": 0, "y": 1, "z": 2}, lambda fields: fields["position_ref"] - fields["position"]),
-        Tracked("deg", 180.0 / math.pi, {"phi": 0, "theta": 1, "psi": 2}, _heading_error, diagnostic="attitude_error"),
+        TrackedSignal("m", 1.0, {"x": 0, "y": 1, "z": 2}, lambda fields: fields["position_ref"] - fields["position"]),
+        TrackedSignal(
+            "deg", 180.0 / math.pi, {"phi": 0, "theta": 1, "psi": 2}, _heading_error, diagnostic="attitude_error"
+        ),
     ),
     norm=True,
-    band=0.02,
+    settling_band=0.02,
     efforts=(
-        Effort("thrust", "n", "wrench_applied", slice(0, 1), {"u1": 0}),
-        Effort("torque", "nm", "wrench_applied", slice(1, 4), {"u2": 0, "u3": 1, "u4": 2}),
+        EffortSignal("thrust", "n", "wrench_applied", slice(0, 1), {"u1": 0}),
+        EffortSignal("torque", "nm", "wrench_applied", slice(1, 4), {"u2": 0, "u3": 1, "u4": 2}),
     ),
     power=_induced_power,
-    limited="rotor_thrust",
-    near=0.01,
+    saturated_field="rotor_thrust",
+    saturation_margin=0.01,
     tde_errors={"tde_error_rms_p": "sigma_p", "tde_error_rms_q": "sigma_q"},
-    means={"robust_gain_mean_p": "c_p", "robust_gain_mean_q": "c_q"},
+    diagnostic_means={"robust_gain_mean_p": "c_p", "robust_gain_mean_q": "c_q"},
 )
 """Position and attitude, as in table 3.1 of the thesis; an error of 2 cm counts as recovered."""
 
@@ -244,24 +250,24 @@ def plan(duration: float, period: float, lift: float = 0.0) -> Array:
     )
 
 
-def start(realised: Mapping[str, Any], lift: float = 0.0) -> Vector:
+def start(sampled: Mapping[str, Any], lift: float = 0.0) -> Vector:
     """Where the vehicle is at the start (m), of a path that is raised by `lift`."""
-    x, y, z = map(operator.add, START, realised.get("initial_position", {}).get("offset", (0.0, 0.0, 0.0)))
+    x, y, z = map(operator.add, START, sampled.get("initial_position", {}).get("offset", (0.0, 0.0, 0.0)))
     return x, y, z + lift
 
 
-def hover_thrusts(realised: Mapping[str, Any], lift: float = 0.0) -> list[float]:
+def hover_thrusts(sampled: Mapping[str, Any], lift: float = 0.0) -> list[float]:
     """Rotor thrusts (N) that balance the level vehicle at the start, with whatever it carries, as far as they can."""
-    mass = robot.MASS * realised.get("mass_error", {}).get("factor", 1.0)
-    payload = realised.get("payload")
+    mass = robot.MASS * sampled.get("mass_scale", {}).get("factor", 1.0)
+    payload = sampled.get("payload")
     moment_x = moment_y = 0.0
-    if payload is not None and payload["attach"] == 0.0 < payload["drop"]:
+    if payload is not None and payload["attach_time"] == 0.0 < payload["detach_time"]:
         x, y, _ = payload["position"]
         mass += payload["mass"]
         moment_x, moment_y = payload["mass"] * GRAVITY * y, -payload["mass"] * GRAVITY * x
     gain = 1.0
-    if "ground_effect" in realised:
-        gain = thrust_gain(start(realised, lift)[2], robot.ROTOR_RADIUS, realised["ground_effect"]["strength"], max)
+    if "ground_effect" in sampled:
+        gain = thrust_gain(start(sampled, lift)[2], robot.ROTOR_RADIUS, sampled["ground_effect"]["strength"], max)
     balance = robot.thrusts(mass * GRAVITY, moment_x, moment_y, 0.0)
     return [min(max(thrust / gain, 0.0), robot.MAX_THRUST) for thrust in balance]
 

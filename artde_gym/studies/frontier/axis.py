@@ -7,9 +7,9 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from artde_gym.disturbances import KINDS
+from artde_gym.disturbances import DISTURBANCES
 from artde_gym.disturbances.kinds import parameters_of
-from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from artde_gym.evaluation.environments import PICTURES, arguments_of, robot_of
 from artde_gym.kit import Harder
 from artde_gym.studies.frontier.standard import standard_for
@@ -69,7 +69,7 @@ def placed(disturbances: Mapping[str, Any], kind: str, name: str, value: Any) ->
         OptionError: for a kind that takes a list, if none is given.
     """
     given = disturbances.get(kind)
-    if not KINDS[kind].repeated:
+    if not DISTURBANCES[kind].multiple:
         return {**disturbances, kind: {**parameters_of(kind, given), name: value}}
     entries = [given] if isinstance(given, Mapping) else given
     if not (isinstance(entries, (list, tuple)) and entries and all(isinstance(entry, Mapping) for entry in entries)):
@@ -85,7 +85,7 @@ def axis(
     tolerance: float | None = None,
     harder: Harder | None = None,
 ) -> Axis:
-    """The axis at `path`: "kind.parameter" of `artde_gym.disturbances.KINDS`, or an argument of the environment.
+    """The axis at `path`: "kind.parameter" of `artde_gym.disturbances.DISTURBANCES`, or an argument of the environment.
 
     Raises:
         UnknownNameError: if there is no number at this path.
@@ -113,7 +113,7 @@ def _find(env_id: str, path: str) -> tuple[str | None, str, str]:
     robot = robot_of(env_id)
     disturbances = {
         f"{kind.name}.{parameter.name}": (kind.name, parameter.name, parameter.unit)
-        for kind in KINDS.values()
+        for kind in DISTURBANCES.values()
         if kind.honored_by(robot)
         for parameter in kind.parameters_for(robot)
         if parameter.size == 1
@@ -129,7 +129,7 @@ def _find(env_id: str, path: str) -> tuple[str | None, str, str]:
         return disturbances[path]
     if path in numbers:
         return None, path, ARGUMENT_UNITS.get(path, "1")
-    raise UnknownNameError("vary", path, among(path, [*disturbances, *numbers]))
+    raise UnknownNameError("vary", path, suggest_names(path, [*disturbances, *numbers]))
 
 
 def _check(varied: Axis, time_step: float | None) -> None:
@@ -141,7 +141,7 @@ def _check(varied: Axis, time_step: float | None) -> None:
         raise OptionError("tolerance", varied.tolerance, f"{finest:g} to high - low, which is {span:g}")
     quantum = time_step if varied.path == "control_period" else None
     if varied.kind is not None:
-        (parameter,) = (p for p in KINDS[varied.kind].parameters if p.name == varied.name)
+        (parameter,) = (p for p in DISTURBANCES[varied.kind].parameters if p.name == varied.name)
         for field, value in (("low", varied.low), ("high", varied.high)):
             if not parameter.low <= value <= parameter.high:
                 raise OptionError(field, value, f"{parameter.low:g} to {parameter.high:g} for {varied.path}")

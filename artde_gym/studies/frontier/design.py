@@ -6,9 +6,9 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from artde_gym.errors import OptionError, among
-from artde_gym.evaluation.cells import Cell, tried
-from artde_gym.evaluation.environments import Backend, arguments_of
+from artde_gym.errors import OptionError, suggest_names
+from artde_gym.evaluation.cells import Cell, validate_cell
+from artde_gym.evaluation.environments import arguments_of
 from artde_gym.evaluation.plan import Plan
 from artde_gym.studies.frontier.axis import Axis
 from artde_gym.studies.frontier.standard import standard_test
@@ -42,14 +42,14 @@ class Design:
         (cell,) = plan.cells
         arguments = dict(cell.kwargs)
         disturbances = arguments.pop("disturbances", None)
-        _check_arguments(cell.env_id, plan.backend, axis, arguments)
+        _check_arguments(cell.env_id, plan.vectorized, axis, arguments)
         if disturbances is None:
             disturbances, arguments = standard_test(cell.env_id, axis.path, arguments)
         design = cls(axis, survival, disturbances, arguments)
         for end in (axis.levels[0], axis.levels[-1]):
             placed = design.at(end, cell)
             if axis.kind is None:  # nothing here knows the argument's range: let the environment refuse it at once
-                tried(plan.backend, placed)
+                validate_cell(plan.vectorized, placed)
         return design
 
     def at(self, value: float, cell: Cell) -> Cell:
@@ -58,10 +58,10 @@ class Design:
         return cell._replace(kwargs={**arguments, "disturbances": disturbances})
 
 
-def _check_arguments(env_id: str, backend: Backend, axis: Axis, given: Mapping[str, Any]) -> None:
-    known = arguments_of(env_id, backend)
+def _check_arguments(env_id: str, vectorized: bool, axis: Axis, given: Mapping[str, Any]) -> None:
+    known = arguments_of(env_id, vectorized)
     for name in given:
         if name not in known:
-            raise OptionError(f"argument of {env_id}", name, among(name, known))
+            raise OptionError(f"argument of {env_id}", name, suggest_names(name, known))
         if axis.kind is None and name == axis.name:
             raise OptionError("env_kwargs", name, "arguments that are not varied")

@@ -9,7 +9,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from artde_gym.palette import Look, looks
+from artde_gym.palette import Style, styles
 from artde_gym.studies.frontier.result import Frontier, value_text
 
 WIDTH = 8.0  # inch
@@ -23,7 +23,7 @@ def draw(found: Frontier, file: BinaryIO) -> None:
     """Write a PNG. Above: survival with Wilson's 95 % bars. Below: what each controller survives, its bracket pale."""
     rows: list[dict[Any, Any]] = found.table.to_dict(orient="records")
     levels: list[dict[Any, Any]] = found.levels.to_dict(orient="records")
-    shown = looks(str(row["controller"]) for row in rows)
+    shown = styles(str(row["controller"]) for row in rows)
     heights = (CURVES, ROW * (len(rows) + 1))
     figure = Figure(figsize=(WIDTH, sum(heights) + 0.3), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
@@ -38,7 +38,7 @@ def draw(found: Frontier, file: BinaryIO) -> None:
     figure.savefig(file, format="png")
 
 
-def _curve(axes: Any, levels: list[dict[Any, Any]], look: Look, shift: float) -> None:
+def _curve(axes: Any, levels: list[dict[Any, Any]], look: Style, shift: float) -> None:
     if not levels:
         return
     x = [level["value"] + shift for level in levels]
@@ -46,21 +46,21 @@ def _curve(axes: Any, levels: list[dict[Any, Any]], look: Look, shift: float) ->
     # Wilson's bounds of 0 and 1 miss the rate by a rounding error, and a bar must not be negative
     bars = [[max(0.0, level["rate"] - level["low"]) for level in levels]]
     bars.append([max(0.0, level["high"] - level["rate"]) for level in levels])
-    axes.errorbar(x, rate, bars, fmt="none", ecolor=look.colour, elinewidth=1, capsize=2, alpha=0.5, zorder=2)
-    axes.plot(x, rate, color=look.colour, marker=look.marker, markersize=6, linewidth=1.6, zorder=3)
+    axes.errorbar(x, rate, bars, fmt="none", ecolor=look.color, elinewidth=1, capsize=2, alpha=0.5, zorder=2)
+    axes.plot(x, rate, color=look.color, marker=look.marker, markersize=6, linewidth=1.6, zorder=3)
 
 
-def _bar(axes: Any, place: int, row: dict[Any, Any], look: Look, found: Frontier) -> None:
+def _bar(axes: Any, place: int, row: dict[Any, Any], look: Style, found: Frontier) -> None:
     axis = found.axis
     easy = axis.low if axis.harder == "larger" else axis.high
     relation, text = row["relation"], value_text(row, axis.unit)
     end = easy if relation in ("", "<", ">") else row["frontier"]
-    axes.barh(place, end - easy, left=easy, height=0.5, color=look.colour)
+    axes.barh(place, end - easy, left=easy, height=0.5, color=look.color)
     if relation == "=":
-        axes.barh(place, row["high"] - row["low"], left=row["low"], height=0.5, color=look.colour, alpha=0.25)
-        axes.plot(end, place, color=look.colour, marker=look.marker, markersize=8, markeredgecolor="white", zorder=4)
+        axes.barh(place, row["high"] - row["low"], left=row["low"], height=0.5, color=look.color, alpha=0.25)
+        axes.plot(end, place, color=look.color, marker=look.marker, markersize=8, markeredgecolor="white", zorder=4)
     axes.annotate(
-        text, (1.01, place), xycoords=("axes fraction", "data"), va="center", color=look.colour, annotation_clip=False
+        text, (1.01, place), xycoords=("axes fraction", "data"), va="center", color=look.color, annotation_clip=False
     )
 
 
@@ -85,7 +85,7 @@ def _finish_upper(axes: Any, found: Frontier, count: int) -> None:
     axes.set_title(note, fontsize=8.5, color=GREY, loc="left")
 
 
-def _finish_lower(axes: Any, found: Frontier, shown: Mapping[str, Look]) -> None:
+def _finish_lower(axes: Any, found: Frontier, shown: Mapping[str, Style]) -> None:
     axis = found.axis
     margin = 0.03 * (axis.high - axis.low)
     axes.set_xlim(axis.low - margin, axis.high + margin)
@@ -93,7 +93,7 @@ def _finish_lower(axes: Any, found: Frontier, shown: Mapping[str, Look]) -> None
     axes.set_ylim(len(shown) - 0.4, -0.6)  # the first controller on top
     axes.set_yticks(range(len(shown)), list(shown), fontweight="bold")
     for tick, look in zip(axes.get_yticklabels(), shown.values(), strict=True):
-        tick.set_color(look.colour)
+        tick.set_color(look.color)
     axes.tick_params(axis="y", length=0)
     axes.spines[["top", "right"]].set_visible(False)
     title = (

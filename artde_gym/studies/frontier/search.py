@@ -31,7 +31,6 @@ from typing import Any
 
 from artde_gym.evaluation import statistics
 from artde_gym.evaluation.cells import CUSTOM
-from artde_gym.evaluation.environments import Backend
 from artde_gym.evaluation.evaluate import run_plan
 from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.plan import Plan
@@ -45,7 +44,7 @@ from artde_gym.studies.frontier.result import Frontier
 from artde_gym.studies.frontier.store import FrontierStore
 from artde_gym.studies.frontier.table import LEVEL_COLUMNS, frontier_of
 
-TRACE_HZ = 10.0  # a frontier has hundreds of episodes; their traces are for a look at a fall, not for metrics
+RECORD_HZ = 10.0  # a frontier has hundreds of episodes; their traces are for a look at a fall, not for metrics
 
 
 @writes_folder
@@ -66,7 +65,7 @@ def frontier(
     disturbances: Mapping[str, Any] | None = None,
     env_kwargs: Mapping[str, Any] | None = None,
     gains: Mapping[str, Mapping[str, Any]] | None = None,
-    backend: Backend = "single",
+    vectorized: bool = False,
     allow_mixed: bool = False,
     on_progress: Callable[[float, Update], None] | None = None,
 ) -> Frontier:
@@ -75,7 +74,7 @@ def frontier(
     Args:
         controllers: as for `evaluate`.
         env_id: any registered environment of this project.
-        vary: "kind.parameter" of `artde_gym.disturbances.KINDS`, in all entries of a kind that takes several; or an
+        vary: "kind.parameter" of `artde_gym.disturbances.DISTURBANCES`, in all entries of a kind that takes several; or an
             argument of the environment that is a number.
         low: smallest value, in the parameter's unit (a control period in s); there are defaults for usual paths.
         high: largest value.
@@ -88,7 +87,7 @@ def frontier(
         out: folder to store everything in; the same call continues an interrupted one.
         disturbances: in place of the standard test's; the environment's own duration is then kept, too.
         env_kwargs: arguments of the environment.
-        gains: as for `evaluate`, also `backend` and `allow_mixed`.
+        gains: as for `evaluate`, also `vectorized` and `allow_mixed`.
         on_progress: called with the value of the running level and the progress of its episodes.
 
     Returns:
@@ -107,8 +106,8 @@ def frontier(
         disturbances=disturbances,
         env_kwargs=env_kwargs,
         gains=gains,
-        backend=backend,
-        trace_hz=TRACE_HZ,
+        vectorized=vectorized,
+        record_hz=RECORD_HZ,
         allow_mixed=allow_mixed,
     )
     design = Design.of(plan, axis(plan.cells[0].env_id, vary, low, high, tolerance, harder), survival)
@@ -127,7 +126,7 @@ def _configuration(plan: Plan, design: Design) -> dict[str, Any]:
         "disturbances": design.disturbances,
         "env_kwargs": design.arguments,
         "gains": plan.gains,
-        "backend": plan.backend,
+        "vectorized": plan.vectorized,
     }
 
 

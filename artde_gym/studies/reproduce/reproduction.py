@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from artde_gym.evaluation.cells import Cell
 from artde_gym.evaluation.evaluate import run_plan
 from artde_gym.evaluation.labels import named_controllers
@@ -33,7 +33,7 @@ from artde_gym.scenarios import scenario as find_scenario
 from artde_gym.studies.reproduce.claims import all_claims, judge
 
 ADAPTIVE, ABLATION = "artde", "tde+kd"
-TRACED = 3  # episodes of each cell that leave their signals: to look at; compressing all takes a minute or two
+RECORD_EPISODES = 3  # episodes of each cell that leave their signals: to look at; compressing all takes a minute or two
 GAIN = "robust_gain_mean"  # column of a law's mean c; with a suffix for each loop of a cascade, as its gains have
 
 
@@ -57,7 +57,7 @@ def kit_of(title: str) -> RobotKit:
         UnknownNameError: if there is none with scenarios to reproduce.
     """
     if title not in titles():
-        raise UnknownNameError("robot", title, among(title, titles()))
+        raise UnknownNameError("robot", title, suggest_names(title, titles()))
     return next(kit for kit in ROBOTS.values() if kit.title == title)
 
 
@@ -121,7 +121,7 @@ def reproduce(
         seed=seed,
         workers=workers,
         env_kwargs={"engine": engine},
-        traced=TRACED,
+        record_episodes=RECORD_EPISODES,
         allow_mixed=allow_mixed,
     )
     folder = Path(out)

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from artde_gym.evaluation import statistics
-from artde_gym.evaluation.environments import tracking_of
+from artde_gym.evaluation.environments import metrics_spec_of
 from artde_gym.studies.sweep.execution import Sweep
 
 MOST = 50  # rows
@@ -71,7 +71,7 @@ def _narrow(cells: list[Any], varied: list[str]) -> Table:
 
 def _figures(frame: Any) -> tuple[str, str, str, str]:
     """Falls, their rate's interval, mean error and its interval."""
-    falls, unit = int(frame["fell"].sum()), tracking_of(frame.iloc[0]["env"]).errors[0].unit
+    falls, unit = int(frame["fell"].sum()), metrics_spec_of(frame.iloc[0]["env"]).errors[0].unit
     rate, error = statistics.rate(falls, len(frame)), statistics.mean(frame[f"rmse_{unit}"])
     span = f"{error.low:.3g}..{error.high:.3g}" if math.isfinite(error.low) else ""
     return f"{falls}/{len(frame)}", f"{100 * rate.low:.0f}..{100 * rate.high:.0f}", f"{error.value:.3g} {unit}", span

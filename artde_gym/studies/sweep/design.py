@@ -34,11 +34,10 @@ from typing import Any, get_args
 
 import numpy as np
 
-from artde_gym.disturbances import KINDS
-from artde_gym.errors import OptionError, UnknownNameError, among
+from artde_gym.disturbances import DISTURBANCES
+from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from artde_gym.evaluation import canonical
 from artde_gym.evaluation.cells import Cell, cells_of
-from artde_gym.evaluation.environments import Backend
 from artde_gym.evaluation.identity import identity_of
 from artde_gym.registration import ControllerSpec, registered_controllers
 from artde_gym.scenarios import scenario as find_scenario
@@ -54,7 +53,7 @@ SETTINGS: dict[str, Any] = {
     "seed": 0,
 }
 """What makes a cell, with its default; all of it as `evaluate` takes it, for one controller."""
-KEYS = (*SETTINGS, "episodes", "backend", "grid", "sample")
+KEYS = (*SETTINGS, "episodes", "vectorized", "grid", "sample")
 INSIDE = ("gains.<controller>.<gain>", "disturbances.<kind>.<parameter>", "env_kwargs.<argument>")
 DISTRIBUTIONS = ("uniform", "log_uniform", "integers", "normal", "choice")
 MOST_CELLS = 100_000
@@ -64,7 +63,7 @@ DEEPEST = 20  # levels of it
 
 
 @dataclasses.dataclass(frozen=True)
-class Point:
+class SweepCell:
     """One cell of a sweep.
 
     Attributes:
@@ -98,9 +97,9 @@ class Point:
 class Design:
     """A whole sweep: `episodes` of every point. `text` is what was read, as JSON."""
 
-    points: tuple[Point, ...]
+    points: tuple[SweepCell, ...]
     episodes: int
-    backend: Backend
+    vectorized: bool
     text: str
 
 
@@ -142,12 +141,12 @@ def design(given: Mapping[str, Any]) -> Design:
     _check_plain("sweep", given)
     for key in given:
         if key not in KEYS:
-            raise OptionError("key of the sweep", key, among(key, KEYS))
-    episodes, backend = given.get("episodes", 1), given.get("backend", "single")
+            raise OptionError("key of the sweep", key, suggest_names(key, KEYS))
+    episodes, vectorized = given.get("episodes", 1), given.get("vectorized", "single")
     if not (_is_whole(episodes) and 1 <= episodes <= MOST_EPISODES):
         raise OptionError("episodes", episodes, f"a whole number from 1 to {MOST_EPISODES}")
-    if backend not in get_args(Backend):
-        raise OptionError("backend", backend, among(backend, get_args(Backend)))
+    if vectorized not in get_args(Backend):
+        raise OptionError("vectorized", vectorized, suggest_names(vectorized, get_args(Backend)))
     fixed = {**SETTINGS, **{name: value for name, value in given.items() if name in SETTINGS}}
     for name, value in fixed.items():
         _check_setting(name, value)
@@ -164,14 +163,14 @@ def design(given: Mapping[str, Any]) -> Design:
     if count > MOST_CELLS:
         raise OptionError("sweep", f"{count} cells", f"at most {MOST_CELLS}")
     names = {fixed["controller"], *grid.get("controller", ()), *(draw.get("controller") for draw in draws)}
-    points: dict[str, Point] = {}
+    points: dict[str, SweepCell] = {}
     for values in itertools.product(*grid.values()):
         for draw in draws:
-            point = _point(_settings(fixed, {**dict(zip(grid, values, strict=True)), **draw}), backend, names)
+            point = _point(_settings(fixed, {**dict(zip(grid, values, strict=True)), **draw}), vectorized, names)
             points.setdefault(point.id, point)
     if len(points) * episodes > MOST_EPISODES:
         raise OptionError("sweep", f"{len(points) * episodes} episodes", f"at most {MOST_EPISODES}")
-    return Design(tuple(points.values()), episodes, backend, json.dumps(given))
+    return Design(tuple(points.values()), episodes, vectorized, json.dumps(given))
 
 
 def _grid(given: Any) -> dict[str, list[Any]]:
@@ -263,37 +262,37 @@ def _disturbed(settings: Mapping[str, Any], path: str, inside: str, value: Any) 
             raise OptionError("path", path, allowed)
         given = find_scenario(settings["scenario"]).disturbances
     kind, _, parameter = inside.partition(".")
-    if kind not in KINDS:
-        raise UnknownNameError("disturbance", kind, among(kind, KINDS))
+    if kind not in DISTURBANCES:
+        raise UnknownNameError("disturbance", kind, suggest_names(kind, DISTURBANCES))
     if not parameter:
         return {**given, kind: value}
-    names = [known.name for known in KINDS[kind].parameters]
+    names = [known.name for known in DISTURBANCES[kind].parameters]
     if parameter not in names:
-        raise UnknownNameError(f"parameter of {kind}", parameter, among(parameter, names))
+        raise UnknownNameError(f"parameter of {kind}", parameter, suggest_names(parameter, names))
     return placed(given, kind, parameter, value)
 
 
-def _point(settings: Mapping[str, Any], backend: Backend, names: set[Any]) -> Point:
+def _point(settings: Mapping[str, Any], vectorized: bool, names: set[Any]) -> SweepCell:
     known, controller = registered_controllers(), settings["controller"]
     if controller not in known:
-        raise UnknownNameError("controller", controller, among(controller, known))
+        raise UnknownNameError("controller", controller, suggest_names(controller, known))
     for name in settings["gains"]:
         if name not in names:
-            raise UnknownNameError("gains", name, among(name, [str(one) for one in names if one is not None]))
+            raise UnknownNameError("gains", name, suggest_names(name, [str(one) for one in names if one is not None]))
     given = (settings["env"], settings["scenario"], settings["env_kwargs"], settings["disturbances"])
-    (cell,) = cells_of(*given, backend)
+    (cell,) = cells_of(*given, vectorized)
     gains, seed, spec = settings["gains"].get(controller, {}), settings["seed"], known[controller]
-    means = cell._replace(kwargs=canonical.arguments(cell.kwargs, cell.env_id, backend))
-    decides = [*means, controller, identity_of(spec).value, canonical.numbers(gains), seed, backend]
+    means = cell._replace(kwargs=canonical.arguments(cell.kwargs, cell.env_id, vectorized))
+    decides = [*means, controller, identity_of(spec).value, canonical.numbers(gains), seed, vectorized]
     digest = hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
-    return Point(cell, controller, spec, gains, seed, digest[:16])
+    return SweepCell(cell, controller, spec, gains, seed, digest[:16])
 
 
 def _check_path(path: str) -> None:
     head, _, rest = path.partition(".")
     depth = {"gains": 2, "env_kwargs": 1, "disturbances": 1}.get(head, 0)
     if path not in SETTINGS and not (depth and rest.count(".") >= depth - 1 and all(path.split("."))):
-        raise UnknownNameError("path", path, among(path, [*SETTINGS, *INSIDE]))
+        raise UnknownNameError("path", path, suggest_names(path, [*SETTINGS, *INSIDE]))
 
 
 def _check_at(path: str, value: Any) -> None:

@@ -15,8 +15,8 @@ from typing import Any, Literal, get_args
 
 import pandas as pd
 
-from artde_gym.errors import ArtdeGymError, OptionError, StoreError, among
-from artde_gym.evaluation.cells import tried
+from artde_gym.errors import ArtdeGymError, OptionError, StoreError, suggest_names
+from artde_gym.evaluation.cells import validate_cell
 from artde_gym.evaluation.gains import policy_for
 from artde_gym.evaluation.identity import behind
 from artde_gym.evaluation.lock import writes_folder
@@ -24,7 +24,7 @@ from artde_gym.evaluation.rollout import Episode
 from artde_gym.evaluation.tasks import Case, Progress, Task, Update, labels_of, run_task, task_of, tasks_of
 from artde_gym.evaluation.workers import Runs, check_picklable, check_workers, run_jobs
 from artde_gym.studies.sweep import parquet
-from artde_gym.studies.sweep.design import Design, Point, design, read
+from artde_gym.studies.sweep.design import Design, SweepCell, design, read
 from artde_gym.studies.sweep.ray_workers import check_address, run_on_ray
 from artde_gym.studies.sweep.store import Key, SweepStore, read_sweep
 
@@ -111,7 +111,7 @@ def sweep(
 
 def _check_executor(executor: Any, address: Any) -> None:
     if executor not in get_args(Executor):
-        allowed = f"{among(executor, get_args(Executor))}; a physics engine is an argument of environments (env_kwargs)"
+        allowed = f"{suggest_names(executor, get_args(Executor))}; a physics engine is an argument of environments (env_kwargs)"
         raise OptionError("executor", executor, allowed)
     if address is not None and executor != "ray":
         raise OptionError("address", address, "none without executor 'ray'")
@@ -133,7 +133,7 @@ def _runs(
     return run_jobs(_run, tasks, workers, on_time)
 
 
-def _keep(runs: Runs, store: SweepStore, points: Mapping[str, Point], progress: Progress) -> bool:
+def _keep(runs: Runs, store: SweepStore, points: Mapping[str, SweepCell], progress: Progress) -> bool:
     """Store episodes as they are finished; return False if interrupted."""
     try:
         for task, results in runs:
@@ -167,7 +167,7 @@ def _refuse_others(plan: Design, store: SweepStore) -> None:
         raise StoreError("sweep folder", str(store.folder), allowed)
 
 
-def _check(plan: Design, points: Mapping[str, Point], done: set[Key], on_progress: OnProgress | None) -> None:
+def _check(plan: Design, points: Mapping[str, SweepCell], done: set[Key], on_progress: OnProgress | None) -> None:
     """Build everything once, so that a bad cell shows before the first episode; cells with episodes have been tried."""
     begun = {cell for cell, _ in done}
     fresh = [(name, point) for name, point in points.items() if point.id not in begun]
@@ -175,10 +175,10 @@ def _check(plan: Design, points: Mapping[str, Point], done: set[Key], on_progres
     last, env = None, None
     for i, (name, point) in enumerate(fresh, start=1):
         if _place(point) != last:
-            last, env = _place(point), tried(plan.backend, point.cell)
+            last, env = _place(point), validate_cell(plan.vectorized, point.cell)
         policy_for(point.spec, env, point.gains)
         if on_progress is not None:
-            task = task_of(_case(name, point), [0], plan.backend)
+            task = task_of(_case(name, point), [0], plan.vectorized)
             on_progress("cells checked", Update(task, 0.0, True, i, len(fresh)))
 
 
@@ -186,30 +186,30 @@ def _behind(plan: Design) -> dict[str, str]:
     """Weights and code behind the controllers, each of them built once for each environment."""
     found: dict[str, str] = {}
     for point in {(point.controller, point.cell.env_id): point for point in reversed(plan.points)}.values():
-        policy = policy_for(point.spec, tried(plan.backend, point.cell), point.gains)
+        policy = policy_for(point.spec, validate_cell(plan.vectorized, point.cell), point.gains)
         found |= behind(point.controller, point.cell.env_id, point.spec, policy)
     return found
 
 
-def _place(point: Point) -> tuple[str, str, str]:
+def _place(point: SweepCell) -> tuple[str, str, str]:
     """Environment, arguments, disturbances."""
     kwargs = dict(point.cell.kwargs)
     disturbances = kwargs.pop("disturbances", None)
     return point.cell.env_id, json.dumps(kwargs), json.dumps(disturbances)
 
 
-def _tasks(plan: Design, points: Mapping[str, Point], done: set[Key]) -> Iterator[Task]:
+def _tasks(plan: Design, points: Mapping[str, SweepCell], done: set[Key]) -> Iterator[Task]:
     """Return what is left to run."""
     names = {point.id: (name, point.controller) for name, point in points.items()}
     finished = {(*names[cell], episode) for cell, episode in done}
-    return tasks_of([_case(name, point) for name, point in points.items()], plan.episodes, plan.backend, finished)
+    return tasks_of([_case(name, point) for name, point in points.items()], plan.episodes, plan.vectorized, finished)
 
 
-def _case(name: str, point: Point) -> Case:
+def _case(name: str, point: SweepCell) -> Case:
     return Case(point.cell._replace(name=name), point.controller, point.spec, point.gains, point.seed)
 
 
-def _rows(point: Point, task: Task, results: list[Episode]) -> Iterator[dict[str, Any]]:
+def _rows(point: SweepCell, task: Task, results: list[Episode]) -> Iterator[dict[str, Any]]:
     for i, result in enumerate(results):
         labels = {**labels_of(task, i), "cell": point.id, "scenario": point.cell.name}
         yield {**labels, **point.columns, **result.row}

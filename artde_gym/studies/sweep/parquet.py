@@ -3,7 +3,7 @@
 The schema, version `SCHEMA`, is the same for all files of a sweep. Columns in front: `cell` (hash of all that makes a
 cell), `controller`, `env`, `scenario`, `seed`, `episode`. Then, in alphabetical order, what else makes the cell
 (`gains.<gain>`, `env_kwargs.<argument>`, `disturbances` as JSON), the columns of `artde_gym.evaluation.metrics` and the
-realised disturbances (`disturbance.payload.mass`, ...). Numbers are float64, but for `seed` (uint64) and `episode`
+sampled disturbances (`disturbance.payload.mass`, ...). Numbers are float64, but for `seed` (uint64) and `episode`
 (int64); lists and mappings are JSON. What an episode has no value for is null, never NaN.
 """
 

@@ -35,7 +35,7 @@ class Proposer:
     ) -> Gains:
         """Gains of trial `number`, to four digits."""
         if number == 0:
-            return {gain: where.start for gain, where in space.items()}
+            return {gain: where.initial for gain, where in space.items()}
         optuna = self._optuna
         ranges: dict[str, Any] = {
             gain: optuna.distributions.FloatDistribution(where.low, where.high, log=True)

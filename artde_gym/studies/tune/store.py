@@ -10,7 +10,7 @@ from typing import Any
 
 import pandas as pd
 
-from artde_gym.arguments import reading
+from artde_gym.arguments import wrap_read_errors
 from artde_gym.errors import StoreError
 from artde_gym.evaluation.lock import is_empty
 from artde_gym.evaluation.provenance import MIXED, continued, provenance
@@ -46,7 +46,7 @@ class TuningStore:
             before = claim(path, RECORD, self._configuration)
             trials = path / "trials.csv"
             if trials.exists():
-                with reading("trials.csv", trials, "a table that `tune` wrote", StoreError):
+                with wrap_read_errors("trials.csv", trials, "a table that `tune` wrote", StoreError):
                     with trials.open(encoding="utf-8", newline="") as file:
                         self.rows = [_parsed(row) for row in csv.DictReader(file, strict=True)]
                     for row in self.rows:

@@ -27,10 +27,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from artde_gym.arguments import whole
+from artde_gym.arguments import check_integer
 from artde_gym.errors import OptionError
 from artde_gym.evaluation import canonical
-from artde_gym.evaluation.environments import Backend, single, tracking_of, with_engine
+from artde_gym.evaluation.environments import metrics_spec_of, single, with_engine
 from artde_gym.evaluation.evaluate import run_plan
 from artde_gym.evaluation.gains import policy_for
 from artde_gym.evaluation.identity import behind
@@ -39,7 +39,7 @@ from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.plan import MOST_EPISODES, Plan
 from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.tasks import Update
-from artde_gym.registration import registered_controllers, search_space
+from artde_gym.registration import registered_controllers, tuning_space
 from artde_gym.studies.tune.proposer import Gains, Proposer
 from artde_gym.studies.tune.store import TRIAL_COLUMNS, TuningStore, frame_of
 
@@ -87,7 +87,7 @@ def tune(
     out: str | Path | None = None,
     disturbances: Mapping[str, Any] | None = None,
     env_kwargs: Mapping[str, Any] | None = None,
-    backend: Backend = "single",
+    vectorized: bool = False,
     allow_mixed: bool = False,
     on_progress: Callable[[str, Update], None] | None = None,
 ) -> Tuning:
@@ -95,7 +95,7 @@ def tune(
 
     Args:
         controllers: registered names.
-        env_id: as for `evaluate`, also for `disturbances`, `env_kwargs`, `backend`, `workers` and `allow_mixed`.
+        env_id: as for `evaluate`, also for `disturbances`, `env_kwargs`, `vectorized`, `workers` and `allow_mixed`.
         scenario: one of `artde_gym.scenarios`; None for the environment as it is.
         trials: of each controller, the preset included.
         episodes: of each trial.
@@ -109,8 +109,8 @@ def tune(
         UnknownNameError, OptionError, DisturbanceError: for a bad argument, before the first trial.
         StoreError: if `out` holds other results, or results of other software, or is written by another process.
     """
-    whole("trials", trials, 1, MOST_TRIALS)
-    whole("held_out", held_out, 1, MOST_EPISODES)
+    check_integer("trials", trials, 1, MOST_TRIALS)
+    check_integer("held_out", held_out, 1, MOST_EPISODES)
     names = _names(controllers)
     plan = Plan.of(
         names,
@@ -121,7 +121,7 @@ def tune(
         workers=workers,
         disturbances=disturbances,
         env_kwargs=env_kwargs,
-        backend=backend,
+        vectorized=vectorized,
         allow_mixed=allow_mixed,
     )
     env_id = plan.cells[0].env_id
@@ -130,8 +130,8 @@ def tune(
         "env": env_id,
         "scenario": scenario,
         "disturbances": disturbances,
-        "env_kwargs": with_engine(env_id, env_kwargs or {}, backend),
-        "backend": backend,
+        "env_kwargs": with_engine(env_id, env_kwargs or {}, vectorized),
+        "vectorized": vectorized,
         "controllers": {name: {gain: list(at) for gain, at in space.items()} for name, space in search.spaces.items()},
         "trials": trials,
         "episodes": episodes,
@@ -167,8 +167,8 @@ class _Search:
         env_id = plan.cells[0].env_id
         self._plan, self._on_progress = plan, on_progress
         self._proposer = Proposer(plan.seed)
-        self.metric = f"rmse_{tracking_of(env_id).errors[0].unit}" if metric is None else metric
-        self.spaces = {name: search_space(name, single(env_id, json.dumps({}))) for name in plan.controllers}
+        self.metric = f"rmse_{metrics_spec_of(env_id).errors[0].unit}" if metric is None else metric
+        self.spaces = {name: tuning_space(name, single(env_id, json.dumps({}))) for name in plan.controllers}
 
     def run(self, trials: int, held_out: int, store: TuningStore | None) -> Tuning:
         """Run what a store does not hold yet; None to keep nothing."""

@@ -32,7 +32,7 @@ def walks(tmp_path_factory):
 @pytest.fixture(scope="module")
 def flights(tmp_path_factory):
     folder = tmp_path_factory.mktemp("flights") / "run"
-    disturbances = {"payload": {"mass": 0.35, "drop": 2.0}}
+    disturbances = {"payload": {"mass": 0.35, "detach_time": 2.0}}
     kwargs = {"duration": 4.0}
     arguments = {"disturbances": disturbances, "env_kwargs": kwargs, "out": folder}
     evaluate(["tde", "atde", "artde"], "QuadInfinity-Payload-v0", episodes=2, **arguments)

@@ -45,12 +45,12 @@ def test_dark_mode_is_dark_and_light_mode_is_light(browser, report):
 
 
 def test_a_controllers_colour_is_lifted_in_the_dark_and_exact_in_the_light(browser, walks):
-    colour = "getComputedStyle(document.querySelector('.chart svg .line, .chart svg .path')).stroke"
+    color = "getComputedStyle(document.querySelector('.chart svg .line, .chart svg .path')).stroke"
     browser.open(walks / "report.html")
-    light = browser.run(colour)
+    light = browser.run(color)
     assert light == "rgb(0, 114, 178)"  # of TDE
     browser.open(walks / "report.html", dark=True)
-    assert browser.run(colour) != light
+    assert browser.run(color) != light
 
 
 def test_a_table_sorts_on_click_both_ways(browser, flights):

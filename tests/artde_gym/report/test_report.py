@@ -21,7 +21,7 @@ from artde_gym.cli import app
 from artde_gym.envs.view import PUSH
 from artde_gym.errors import StoreError
 from artde_gym.evaluation.result import Result
-from artde_gym.palette import Look
+from artde_gym.palette import Style
 from artde_gym.report import write_report
 from artde_gym.report.answer import headline, ranking, sentences
 from artde_gym.report.chart import Axis, Chart
@@ -74,7 +74,7 @@ def test_everything_of_the_biped_and_of_the_quadrotor_is_there(walks, flights):
         walks: [
             "Claims of the thesis",
             "Ground reaction force under artde",
-            "centre of mass",
+            "center of mass",
             "Desired joint",
             "Tilt",
             "push0",
@@ -282,7 +282,7 @@ def test_thinned_lines_keep_every_peak():
     values = rng.normal(size=50_000)
     values[12_345], values[40_001] = 99.0, -99.0
     chart = Chart("noise", Axis("time (s)", 0.0, 1.0), Axis("value (m)", -100.0, 100.0))
-    chart.line(np.linspace(0, 1, len(values)), values, Look("#000000", "o"))
+    chart.line(np.linspace(0, 1, len(values)), values, Style("#000000", "o"))
     (path,) = re.findall(r'class="line"[^>]* d="([^"]*)"', chart.svg())
     heights = [float(point.split()[1]) for point in re.findall(r"[\d.]+ [\d.]+", path)]
     top, bottom = 250 - 40 - 198 * 0.995, 250 - 40 - 198 * 0.005

@@ -12,7 +12,7 @@ from artde_gym.disturbances.numeric import numeric
 from artde_gym.disturbances.schedule import Schedule
 from artde_gym.info import EpisodeInfo
 from artde_gym.layout import Field, Layout
-from artde_gym.tracking import Effort, Tracked, Tracking
+from artde_gym.metrics_spec import EffortSignal, MetricsSpec, TrackedSignal
 from two_link_arm.model import LENGTH, TORQUE, Arm
 
 JOINTS = ("shoulder", "elbow")
@@ -45,16 +45,16 @@ class TwoLinkArmEnv(gym.Env):
     robot_name = "two-link-arm"
     observation_layout, action_layout, nominal_robot = OBSERVATION, ACTION, Arm()
     words = {"site": ("tip",), "joint": JOINTS}
-    tracking = Tracking(
-        errors=(Tracked("deg", 180.0 / math.pi, _AXES, lambda fields: fields["q_ref"] - fields["q"]),),
+    metrics_spec = MetricsSpec(
+        errors=(TrackedSignal("deg", 180.0 / math.pi, _AXES, lambda fields: fields["q_ref"] - fields["q"]),),
         norm=False,
-        band=0.01,
-        efforts=(Effort("torque", "nm", "tau_applied", slice(2), _AXES),),
+        settling_band=0.01,
+        efforts=(EffortSignal("torque", "nm", "tau_applied", slice(2), _AXES),),
         power=lambda fields: np.abs(fields["tau_applied"] * fields["qd"]).sum(axis=-1),
-        limited="tau_applied",
-        near=0.0,
+        saturated_field="tau_applied",
+        saturation_margin=0.0,
         tde_errors={"tde_error_rms": "sigma"},
-        means={"robust_gain_mean": "c"},
+        diagnostic_means={"robust_gain_mean": "c"},
     )
 
     def __init__(self, duration=4.0, control_period=0.002, disturbances=None, render_mode=None, width=640, height=480):
@@ -69,7 +69,7 @@ class TwoLinkArmEnv(gym.Env):
         super().reset(seed=seed)
         given = (options or {}).get("disturbances")
         disturbances = self._disturbances if given is None else self._parsed(given)
-        self.sampled_disturbances = disturbances.draw(self.np_random)
+        self.sampled_disturbances = disturbances.sample(self.np_random)
         self._step, self._q, self._qd, self._tau = 0, np.zeros(2), np.zeros(2), np.zeros(2)
         self._arm, self._force = Arm(), np.zeros(2)
         self._schedule = Schedule(self.sampled_disturbances, TIME_STEP)
@@ -110,7 +110,7 @@ class TwoLinkArmEnv(gym.Env):
     def release_payload(self):
         self._arm = Arm()
 
-    def push(self, site, force):
+    def apply_force(self, site, force):
         """Push the tip with a force (N), of which the plane of the arm takes x and z."""
         self._force = np.add(self._force, (force[0], force[2]))
 

@@ -11,7 +11,7 @@ from artde_gym.layout import Layout
 from controllers.laws.tracking import Array
 
 
-class Coupling(Protocol):
+class ActionAdapter(Protocol):
     """One robot's. All arrays may have leading axes, one entry an environment; memory is a named tuple of arrays."""
 
     features: Layout
@@ -22,25 +22,25 @@ class Coupling(Protocol):
         """Memory at the start of an episode."""
         ...
 
-    def observe(self, observation: Array, inside: Mapping[str, Array], memory: Any) -> tuple[Array, Any]:
+    def observe(self, observation: Array, inside: Mapping[str, Array], state: Any) -> tuple[Array, Any]:
         """What the agent sees (..., n_features), and memory.
 
         Args:
             observation: of the environment.
             inside: what the base remembers of the sample before, and what it is about to see.
-            memory: of the call before.
+            state: of the call before.
         """
         ...
 
-    def decide(self, memory: Any, action: Array) -> Any:
+    def set_action(self, state: Any, action: Array) -> Any:
         """Memory with an action (..., n_actions) in [-1, 1] that acts until the next one."""
         ...
 
-    def advance(self, memory: Any) -> tuple[Array, Any]:
+    def next_residual(self, state: Any) -> tuple[Array, Any]:
         """The acceleration du (..., n) for one control period, and memory."""
         ...
 
-    def reward_terms(self, observation: Array, memory: Any, fell: Any) -> dict[str, Array]:
+    def reward_terms(self, observation: Array, state: Any, fell: Any) -> dict[str, Array]:
         """Terms of the reward of one decision by name, at its end, observed already; weighted by `reward_scales`."""
         ...
 

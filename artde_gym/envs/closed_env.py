@@ -24,7 +24,7 @@ class _ClosedEngine:
         return "CLOSED"  # of which there is one, also in a copy
 
 
-def refuse(*, closed: bool) -> None:
+def require_open(*, closed: bool) -> None:
     """Refuse to go on.
 
     Raises:

@@ -72,13 +72,13 @@ def open_clients() -> int:
     """Count Bullet's physics clients that are open in this process; MuJoCo has none."""
     if missing_bullet():
         return 0
-    from artde_gym.sim.quiet import bullet
+    from artde_gym.sim.pybullet_module import bullet
 
     return sum(bool(bullet.isConnected(physicsClientId=client)) for client in range(MAX_CLIENTS))
 
 
 def _bullet(engine: Any) -> tuple[Any, Any, Any, Any]:
-    from artde_gym.sim.quiet import bullet  # not everywhere; the engine that was given has it
+    from artde_gym.sim.pybullet_module import bullet  # not everywhere; the engine that was given has it
 
     return bullet, engine._client, engine._robot, engine._joints
 

@@ -11,17 +11,17 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from artde_gym.arguments import known_arguments
-from artde_gym.arrays import Array, each
+from artde_gym.arrays import Array, vectorize
 from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.effects import Effects, load_base
 from artde_gym.disturbances.ground import LOADED, GrfPulses
 from artde_gym.disturbances.kinds import RobotStates
 from artde_gym.disturbances.schedule import NEVER
 from artde_gym.disturbances.sensing import Sensing
-from artde_gym.envs.batch import BatchEnv, Mask
-from artde_gym.envs.biped_course import Course
+from artde_gym.envs.biped_disturbances import EpisodeDisturbances
 from artde_gym.envs.documentation import filled
 from artde_gym.envs.options import warn_of_idle
+from artde_gym.envs.vector import BaseVectorEnv, Mask
 from artde_gym.errors import OptionError
 from artde_gym.robots.ojas import model as robot
 from artde_gym.robots.ojas import task
@@ -60,17 +60,17 @@ PLAN = slice(COLUMNS["q_ref"].start, COLUMNS["qdd_ref"].stop)
 CLOCK = slice(COLUMNS["load_left_ref"].start, COLUMNS["phase"].stop)
 BASE = slice(COLUMNS["base_height"].start, COLUMNS["base_angular_velocity"].stop)
 
-_ARCTANGENT, _ARCSINE, _EXP = each(math.atan2), each(arcsine), each(math.exp)
+_ARCTANGENT, _ARCSINE, _EXP = vectorize(math.atan2), vectorize(arcsine), vectorize(math.exp)
 
 
-class BipedVectorEnv(BatchEnv):
+class BipedVectorEnv(BaseVectorEnv):
     """What all tasks of many robots share; a subclass says what disturbs the walk by default.
 
     Args:
         num_envs: number of robots.
         engine: "mujoco"; None as well, with a warning that it is not the one of `gym.make`.
         threads: that step the robots.
-        render_mode, autoreset_mode, max_episode_steps: see `artde_gym.envs.batch.BatchEnv`.
+        render_mode, autoreset_mode, max_episode_steps: see `artde_gym.envs.vector.BaseVectorEnv`.
         disturbances: as all further arguments, see `artde_gym.envs.biped.BipedEnv`.
 
     Raises:
@@ -81,7 +81,7 @@ class BipedVectorEnv(BatchEnv):
     default_disturbances: ClassVar[Mapping[str, Any]] = {}
     action_layout = task.ACTION
     robot_name: ClassVar[str] = "ojas"
-    tracking = task.TRACKING
+    metrics_spec = task.METRICS_SPEC
     reward_scales = task.REWARD_SCALES
     fall_reasons = task.FALL_REASONS
     allowed_action = "torques (Nm)"
@@ -126,8 +126,8 @@ class BipedVectorEnv(BatchEnv):
         self._disturbances = self._parse(self.default_disturbances if disturbances is None else disturbances)
         warn_of_idle(self._disturbances, self._last * self.control_period)
         self._batch = make_batch("mujoco", walk.robot, num_envs, task.TIME_STEP, threads)
-        self._courses: dict[int, Course] = {}
-        self._wakes = np.full(num_envs, NEVER)  # time step of each walk in which its course is to be asked again
+        self._active: dict[int, EpisodeDisturbances] = {}
+        self._next_event = np.full(num_envs, NEVER)  # time step of each walk in which its course is to be asked again
         self._pulses: GrfPulses | None = None
         self._pulsed = np.zeros(num_envs, np.bool_)  # robots with ground reaction pulses
         self._effects = Effects(num_envs, self.words)
@@ -138,38 +138,38 @@ class BipedVectorEnv(BatchEnv):
         self._low = -self._high
         first = np.zeros(1, np.int32)
         self._batch.worlds[0].set_friction(task.FRICTION)
-        self._batch.place(0, walk.position, walk.start)
+        self._batch.reset(0, walk.position, walk.start)
         self._still = self._settle(first, walk.start[None], task.SETTLE_STEPS)[0]
-        self._settled = self._batch.snapshot(0)
+        self._settled = self._batch.save_state(0)
 
     def _parse(self, disturbances: Mapping[str, Any]) -> Disturbances:
         return self._walk.parse(disturbances)
 
     def _start(self, drawn: Mapping[int, Mapping[str, Any]]) -> None:
         batch, walk = self._batch, self._walk
-        batch.restore(np.fromiter(drawn, np.int32), self._settled)
+        batch.restore_state(np.fromiter(drawn, np.int32), self._settled)
         self._tau = self._tau.copy()
         restless: dict[int, list[int]] = {}
-        for i, realised in drawn.items():
-            walk.set_up(batch.worlds[i], realised)
-            self._high[i] = task.torque_limit(realised)
+        for i, sampled in drawn.items():
+            walk.set_up(batch.worlds[i], sampled)
+            self._high[i] = task.torque_limit(sampled)
             self._low[i] = -self._high[i]
-            course = self._courses[i] = Course(realised, walk, self._np_random[i])
-            course.start(batch.worlds[i])
-            self._begin_pulses(i, realised.get("grf_pulse"))
-            self._effects.begin(i, realised)
-            self._wakes[i] = course.wakes(0)
+            active = self._active[i] = EpisodeDisturbances(sampled, walk, self._np_random[i])
+            active.start(batch.worlds[i])
+            self._begin_pulses(i, sampled.get("grf_pulse"))
+            self._effects.begin(i, sampled)
+            self._next_event[i] = active.next_event_step(0)
             self._sensing.pop(i, None)
-            if course.sensing is not None:
-                self._sensing[i] = course.sensing
+            if active.sensing is not None:
+                self._sensing[i] = active.sensing
             self._tau[i] = self._still
-            if steps := task.settling(realised):
+            if steps := task.settling(sampled):
                 restless.setdefault(steps, []).append(i)
         for steps, some in restless.items():
             poses = np.array([walk.pose(drawn[i]) for i in some])
             self._tau[some] = self._settle(np.array(some, np.int32), poses, steps)
         for i in drawn:
-            self._courses[i].settled(self._tau[i].copy())
+            self._active[i].begin_walk(self._tau[i].copy())
 
     def _begin_pulses(self, i: int, entry: Mapping[str, Any] | None) -> None:
         if entry is not None and self._pulses is None:
@@ -191,7 +191,7 @@ class BipedVectorEnv(BatchEnv):
             np.copyto(commands, self._tau, where=~goes_on[:, None])
         self._previous, self._tau = self._tau, commands
         steps = self._walk.substeps
-        awake = goes_on & (self._wakes < (self._k + 1) * steps)
+        awake = goes_on & (self._next_event < (self._k + 1) * steps)
         busy = awake | (goes_on & (self._pulsed | self._effects.acting))
         if not busy.any():
             self._step(commands, goes_on, steps)
@@ -206,20 +206,20 @@ class BipedVectorEnv(BatchEnv):
         What acts on these takes the place of what was commanded. Returns events.
         """
         steps, torques = self._walk.substeps, commands.copy()
-        happening = [(i, self._courses[i], int(self._k[i]) * steps) for i in np.flatnonzero(awake).tolist()]
+        happening = [(i, self._active[i], int(self._k[i]) * steps) for i in np.flatnonzero(awake).tolist()]
         events: dict[int, list[str]] = {i: [] for i, _, _ in happening}
-        for i, course, _ in happening:
-            course.begin(commands[i].copy())
+        for i, active, _ in happening:
+            active.begin_period(commands[i].copy())
         for step in range(steps):
-            for i, course, first in happening:
-                torques[i] = course.act(first + step, self._batch.worlds[i], events[i])
+            for i, active, first in happening:
+                torques[i] = active.apply(first + step, self._batch.worlds[i], events[i])
             if self._pulses is not None:
                 forces = self._pulses.forces(self._batch.foot_loads(), self._k * steps + step)
                 self._batch.lift_feet(forces * some[:, None])
             self._step(self._affected(torques, some, step), some, 1)
-        for i, course, first in happening:
-            commands[i] = course.applied()
-            self._wakes[i] = course.wakes(first + steps)
+        for i, active, first in happening:
+            commands[i] = active.applied()
+            self._next_event[i] = active.next_event_step(first + steps)
         return {i: words for i, words in events.items() if words}
 
     def _affected(self, torques: Array, some: Mask, step: int) -> Array:
@@ -238,7 +238,7 @@ class BipedVectorEnv(BatchEnv):
     def _states(self, steps: NDArray[np.int64]) -> RobotStates:
         """The states of all robots, after so many time steps (n,) of each."""
         with np.errstate(invalid="ignore", over="ignore"):  # of a robot that has diverged
-            state = self._batch.read()
+            state = self._batch.state()
         of_base = (state.position, state.quat_xyzw, state.velocity, state.angular_velocity)
         base = (np.stack(parts, axis=1) for parts in of_base)
         return RobotStates(steps * task.TIME_STEP, state.q, state.qd, *base)
@@ -252,7 +252,7 @@ class BipedVectorEnv(BatchEnv):
             self._batch.step(torques[worlds], worlds, steps)
 
     def _truth(self) -> Array:
-        state = self._state = self._batch.read()
+        state = self._state = self._batch.state()
         with np.errstate(invalid="ignore", over="ignore"):  # of a robot that has diverged
             self._tilt = roll_pitch(state.quat_xyzw, _ARCTANGENT, _ARCSINE)
         out = np.empty((self.num_envs, self.observation_layout.size))

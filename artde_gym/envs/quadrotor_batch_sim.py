@@ -31,7 +31,7 @@ from artde_gym.sim.rigid_bodies import MassProperties, RigidBodies, composite, c
 
 FINE = 0.001  # s, resolution of pushes
 PARTS = round(GRID / FINE)
-SLOTS = int(OWN["torque_delay"].parameters[0].high) + 1  # commands that a delay has to remember
+SLOTS = int(OWN["action_delay"].parameters[0].high) + 1  # commands that a delay has to remember
 
 _SITES = {name: place for name, _, place in robot.q450().sites}
 
@@ -44,7 +44,7 @@ class _Event(NamedTuple):
     act: Callable[[], None]
 
 
-class Fleet:
+class QuadrotorBatchSim:
     """`n` vehicles.
 
     Args:
@@ -87,36 +87,36 @@ class Fleet:
         self.pulled = np.zeros(n, dtype)
         self._effects = Effects(n, task.WORDS)
 
-    def begin(self, vehicle: int, realised: Mapping[str, Any], key: np.uint64) -> None:
-        """Begin an episode of one vehicle, at rest in balance, with realised disturbances and the key of its wind."""
+    def begin(self, vehicle: int, sampled: Mapping[str, Any], key: np.uint64) -> None:
+        """Begin an episode of one vehicle, at rest in balance, with sampled disturbances and the key of its wind."""
         self._begun[vehicle] = self._step
-        self._begin_rotors(vehicle, realised)
-        self._effects.begin(vehicle, realised)
-        wind = realised.get("wind")
+        self._begin_rotors(vehicle, sampled)
+        self._effects.begin(vehicle, sampled)
+        wind = sampled.get("wind")
         self._air[:, vehicle] = air(wind)
         self._keep[:, vehicle], self._kick[:, vehicle] = processes(wind)
         self._wind[:, vehicle] = 0.0
         self._keys[vehicle] = key
         self._windy |= wind is not None
-        self._ground_effect[vehicle] = realised.get("ground_effect", {}).get("strength", 0.0)
+        self._ground_effect[vehicle] = sampled.get("ground_effect", {}).get("strength", 0.0)
 
-        factor = realised.get("mass_error", {}).get("factor", 1.0)
+        factor = sampled.get("mass_scale", {}).get("factor", 1.0)
         bare = MassProperties(factor * robot.MASS, (0.0, 0.0, 0.0), factor * np.diag(robot.INERTIA))
-        events = [*self._push_events(vehicle, realised), *self._loss_events(vehicle, realised)]
+        events = [*self._push_events(vehicle, sampled), *self._loss_events(vehicle, sampled)]
         self._fix(vehicle, bare, False)
         if self.cables is not None:
             self.cables.clear(vehicle)
         self.pulled[vehicle] = 0.0
-        payload = realised.get("payload")
-        start: Vector = task.start(realised, self._lift)
-        if payload is not None and payload["drop"] > payload["attach"]:
+        payload = sampled.get("payload")
+        start: Vector = task.start(sampled, self._lift)
+        if payload is not None and payload["detach_time"] > payload["attach_time"]:
             attach, drop = self._changes(vehicle, bare, payload)
-            if payload["attach"] == 0:
+            if payload["attach_time"] == 0:
                 self.bodies.place(vehicle, start)
                 attach()
             else:
-                events.append(_Event(round(payload["attach"] / GRID), (ATTACHED,), attach))
-            events.append(_Event(round(payload["drop"] / GRID), (DROPPED,), drop))
+                events.append(_Event(round(payload["attach_time"] / GRID), (ATTACHED,), attach))
+            events.append(_Event(round(payload["detach_time"] / GRID), (DROPPED,), drop))
         if not (self.cables is not None and self.cables.held[vehicle]):
             self.bodies.place(vehicle, start)
         events.sort(key=lambda event: event.step)
@@ -201,14 +201,14 @@ class Fleet:
         cables.kick(self.bodies, GRID, force, self._wind_at(cables.position) if self._windy else None)
         self.pulled += GRID * cables.tension
 
-    def _begin_rotors(self, vehicle: int, realised: Mapping[str, Any]) -> None:
-        hover = task.hover_thrusts(realised, self._lift)
+    def _begin_rotors(self, vehicle: int, sampled: Mapping[str, Any]) -> None:
+        hover = task.hover_thrusts(sampled, self._lift)
         self.thrusts[:, vehicle] = hover
         self.wrenches[:, vehicle] = robot.wrench(*hover)
-        constant = realised.get("motor_lag", {}).get("time_constant", robot.ROTOR_LAG)
+        constant = sampled.get("motor_lag", {}).get("time_constant", robot.ROTOR_LAG)
         self._shares[:, vehicle] = lag_shares(constant, GRID)
         self._left[:, vehicle] = 1.0
-        self._delay[vehicle] = realised.get("torque_delay", {}).get("samples", 0)
+        self._delay[vehicle] = sampled.get("action_delay", {}).get("steps", 0)
         if self._late is None and self._delay[vehicle]:
             self._late = np.zeros((SLOTS, *self.thrusts.shape), self.thrusts.dtype)
         if self._late is not None:
@@ -268,9 +268,9 @@ class Fleet:
         parts = (np.ascontiguousarray(part.T) for part in (origin, bodies.quat_xyzw, bodies.origin_velocity(), spin))
         return RobotStates((self._step - self._begun) * GRID, joints, joints, *parts)
 
-    def _push_events(self, vehicle: int, realised: Mapping[str, Any]) -> list[_Event]:
+    def _push_events(self, vehicle: int, sampled: Mapping[str, Any]) -> list[_Event]:
         """Pushes act for the share of a step that they cover."""
-        pushes = [Push.of(entry, FINE) for entry in realised.get("push", ())]
+        pushes = [Push.of(entry, FINE) for entry in sampled.get("push", ())]
         missing = len(pushes) - len(self._pushes)
         if missing > 0:
             more = np.zeros((missing, *self._pushes.shape[1:]), self._pushes.dtype)
@@ -280,7 +280,7 @@ class Fleet:
         events: list[_Event] = []
         for slot, push in enumerate(pushes):
             self._at_load[slot, vehicle] = push.site == PAYLOAD
-            self._places[slot, :, vehicle] = _SITES.get(push.site) or realised["payload"]["position"]
+            self._places[slot, :, vehicle] = _SITES.get(push.site) or sampled["payload"]["position"]
             first, last = push.first // PARTS, push.end // PARTS
             for step in sorted({first, first + 1, last, last + 1}):
                 covered = min(push.end, (step + 1) * PARTS) - max(push.first, step * PARTS)
@@ -293,14 +293,14 @@ class Fleet:
     def _push(self, slot: int, vehicle: int, force: Array) -> None:
         self._pushes[slot, :, vehicle] = force
 
-    def _loss_events(self, vehicle: int, realised: Mapping[str, Any]) -> list[_Event]:
+    def _loss_events(self, vehicle: int, sampled: Mapping[str, Any]) -> list[_Event]:
         return [
             _Event(
                 round(loss["start"] / GRID),
                 (),
                 partial(self._lose, vehicle, robot.ROTORS.index(loss["joint"]), loss["factor"]),
             )
-            for loss in realised.get("actuator_loss", ())
+            for loss in sampled.get("actuator_effectiveness", ())
         ]
 
     def _lose(self, vehicle: int, rotor: int, factor: float) -> None:

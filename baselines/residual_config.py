@@ -7,8 +7,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from artde_gym.arguments import flag, number
-from artde_gym.errors import OptionError, among
+from artde_gym.arguments import check_bool, check_number
+from artde_gym.errors import OptionError, suggest_names
 from artde_gym.kit import ROBOTS
 from baselines.agent import agent_of
 
@@ -19,18 +19,18 @@ LARGEST = 1e6  # of a limit
 
 
 @dataclasses.dataclass(frozen=True)
-class Recipe:
+class ResidualConfig:
     """A base controller, and what an agent's action in [-1, 1]^n does on top of it.
 
     Attributes:
         robot: by the environment's `robot_name`.
         base: registered name of the base controller; "none", and the action is the force itself.
         gains: in place of the base's preset's.
-        channel: "synergies" of the legs, "wide-synergies" or raw "joints" (biped), the "attitude" loop, the "position"
+        action_mode: "synergies" of the legs, "wide-synergies" or raw "joints" (biped), the "attitude" loop, the "position"
             loop or both, the "cascade" (quadrotor), "joints" of any other robot; see the robots' modules.
-        hold: time between two decisions (s), a whole number of control periods; 0 for as many as come nearest to
+        decision_period: time between two decisions (s), a whole number of control periods; 0 for as many as come nearest to
             `DECISION`, where the robot has no default.
-        limit: largest size of each component of du (rad/s^2, m/s^2); that of the attitude loop is `TURNING` times it.
+        action_scale: largest size of each component of du (rad/s^2, m/s^2); that of the attitude loop is `TURNING` times it.
         gated: whether the residual fades in by tilt and velocity error (biped), or is there all the time.
 
     Raises:
@@ -40,28 +40,33 @@ class Recipe:
     robot: str
     base: str = "tde"
     gains: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    channel: str = ""
-    hold: float = 0.0
-    limit: float = 0.0
+    action_mode: str = ""
+    decision_period: float = 0.0
+    action_scale: float = 0.0
     gated: bool = True
 
     def __post_init__(self) -> None:
         if not (isinstance(self.robot, str) and self.robot in ROBOTS):
-            raise OptionError("robot", self.robot, among(self.robot, ROBOTS))
+            raise OptionError("robot", self.robot, suggest_names(self.robot, ROBOTS))
         agent = agent_of(self.robot)
-        known = list(agent.channels)
-        if self.channel not in ("", *known):
-            raise OptionError("channel", self.channel, among(self.channel, known))
+        known = list(agent.action_modes)
+        if self.action_mode not in ("", *known):
+            raise OptionError("action_mode", self.action_mode, suggest_names(self.action_mode, known))
         if not isinstance(self.base, str):
             raise OptionError("base", self.base, "a name")
         if not (isinstance(self.gains, Mapping) and all(isinstance(name, str) for name in self.gains)):
             raise OptionError("gains", self.gains, "a mapping of names to values")
-        channel = self.channel or known[0]
-        object.__setattr__(self, "channel", channel)
-        for field, default, most in (("hold", agent.hold, LONGEST), ("limit", agent.channels[channel], LARGEST)):
-            value = number(field, getattr(self, field), 0.0, most, f"a number > 0, up to {most:g}; 0 for the default")
+        channel = self.action_mode or known[0]
+        object.__setattr__(self, "action_mode", channel)
+        for field, default, most in (
+            ("decision_period", agent.decision_period, LONGEST),
+            ("action_scale", agent.action_modes[channel], LARGEST),
+        ):
+            value = check_number(
+                field, getattr(self, field), 0.0, most, f"a number > 0, up to {most:g}; 0 for the default"
+            )
             object.__setattr__(self, field, value or default)
-        object.__setattr__(self, "gated", flag("gated", self.gated))
+        object.__setattr__(self, "gated", check_bool("gated", self.gated))
 
     def periods(self, control_period: float) -> int:
         """Control periods (of so many s) between two decisions.
@@ -69,9 +74,11 @@ class Recipe:
         Raises:
             OptionError: unless it is a whole number.
         """
-        if not self.hold:
+        if not self.decision_period:
             return max(1, round(DECISION / control_period))
-        periods = round(self.hold / control_period)
-        if periods < 1 or not math.isclose(periods * control_period, self.hold, rel_tol=1e-9):
-            raise OptionError("hold", self.hold, f"whole multiples of the control period {control_period:g} s")
+        periods = round(self.decision_period / control_period)
+        if periods < 1 or not math.isclose(periods * control_period, self.decision_period, rel_tol=1e-9):
+            raise OptionError(
+                "decision_period", self.decision_period, f"whole multiples of the control period {control_period:g} s"
+            )
         return periods

@@ -13,11 +13,11 @@ from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.noise import draw_keys
 from artde_gym.disturbances.wind import GRID
-from artde_gym.envs.batch import BatchEnv, Mask
 from artde_gym.envs.documentation import filled
 from artde_gym.envs.options import warn_of_idle
-from artde_gym.envs.quadrotor_fleet import Fleet
+from artde_gym.envs.quadrotor_batch_sim import QuadrotorBatchSim
 from artde_gym.envs.quadrotor_sensors import Measurement, Sensors
+from artde_gym.envs.vector import BaseVectorEnv, Mask
 from artde_gym.errors import OptionError
 from artde_gym.robots.q450 import model as robot
 from artde_gym.robots.q450 import task
@@ -26,7 +26,7 @@ FLEET = 4096  # vehicles that are simulated together; with more, arrays no longe
 
 
 @filled(shared=task.DOCUMENTATION)
-class QuadInfinityPayloadVectorEnv(BatchEnv):
+class QuadInfinityPayloadVectorEnv(BaseVectorEnv):
     """Many quadrotors at once fly an infinity-shaped path with a payload, drop it half-way, and fly it once more.
 
     ## Description
@@ -64,7 +64,7 @@ class QuadInfinityPayloadVectorEnv(BatchEnv):
     action_layout = task.ACTION
     observation_layout = task.OBSERVATION
     robot_name: ClassVar[str] = "q450"
-    tracking = task.TRACKING
+    metrics_spec = task.METRICS_SPEC
     reward_scales: ClassVar[Mapping[str, float]] = task.REWARD_SCALES
     default_disturbances: ClassVar[Mapping[str, Any]] = task.DEFAULT_DISTURBANCES
     lift: ClassVar[float] = 0.0
@@ -111,7 +111,7 @@ class QuadInfinityPayloadVectorEnv(BatchEnv):
         warn_of_idle(self._disturbances, self._last * self.control_period)
         sizes = [min(FLEET, num_envs - first) for first in range(0, num_envs, FLEET)]
         self._fleets = [
-            (slice(first, first + size), Fleet(size, steps, self.dtype, self.lift))
+            (slice(first, first + size), QuadrotorBatchSim(size, steps, self.dtype, self.lift))
             for first, size in zip(range(0, num_envs, FLEET), sizes, strict=True)
         ]
         self._before: list[Array] = []  # thrusts of the fleets a control period ago
@@ -120,11 +120,11 @@ class QuadInfinityPayloadVectorEnv(BatchEnv):
         return task.parse(disturbances)
 
     def _start(self, drawn: Mapping[int, Mapping[str, Any]]) -> None:
-        for i, realised in drawn.items():
+        for i, sampled in drawn.items():
             part, fleet = self._fleets[i // FLEET]
             keys = draw_keys(self._np_random[i], task.STREAMS)
-            fleet.begin(i - part.start, realised, keys[0])
-            self._sensors.begin(i, realised, keys[1:])
+            fleet.begin(i - part.start, sampled, keys[0])
+            self._sensors.begin(i, sampled, keys[1:])
 
     def _advance(self, commands: Array, goes_on: Mask) -> dict[int, list[str]]:
         self._before = [fleet.thrusts for _, fleet in self._fleets]
@@ -160,7 +160,7 @@ class QuadInfinityPayloadVectorEnv(BatchEnv):
             self._look(block, fleet)
         return out.T
 
-    def _look(self, block: Array, fleet: Fleet) -> None:
+    def _look(self, block: Array, fleet: QuadrotorBatchSim) -> None:
         """Fill in what else is observed of a fleet."""
 
     def _measure(self, observations: Array, new: Mask) -> None:

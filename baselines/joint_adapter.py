@@ -14,10 +14,10 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from artde_gym.layout import Field, Layout
-from baselines.recipe import NO_BASE, Recipe
-from controllers.laws.second_order import FilterMemory, second_order
+from baselines.residual_config import NO_BASE, ResidualConfig
+from controllers.laws.second_order import FilterState, second_order
 from controllers.laws.tracking import Array
-from controllers.policies import Plant
+from controllers.policies import ControlInterface
 
 FILTER_RATE = 50.0  # rad/s
 ERROR = 0.05  # rad or m, of all joints together, at which the reward for tracking is 1/e
@@ -25,33 +25,33 @@ PASSED_ON = ("qd", "q_ref", "qd_ref", "qdd_ref", "tau_applied")
 """Fields of the observation that the agent sees as they are."""
 
 
-class JointMemory(NamedTuple):
+class JointAdapterState(NamedTuple):
     """The action that acts (..., n), and the filter of the acceleration."""
 
     action: Array
-    filter: FilterMemory
+    filter: FilterState
 
 
-class JointCoupling:
-    """The coupling at the top.
+class JointAdapter:
+    """The adapter at the top.
 
     Args:
-        plant: of the environment, whose observation has the fields of `controllers.laws.tracking.Signals`.
-        recipe: of the residual.
+        interface: of the environment, whose observation has the fields of `controllers.laws.tracking.JointInput`.
+        config: of the residual.
         gains: of the base; not used.
     """
 
     reward_scales: ClassVar[Mapping[str, float]] = {"tracking": 1.0, "effort": -0.1, "residual": -0.01}
 
-    def __init__(self, plant: Plant, recipe: Recipe, gains: Any) -> None:
+    def __init__(self, interface: ControlInterface, config: ResidualConfig, gains: Any) -> None:
         del gains
-        box, n = plant.action.box(), plant.action.size
+        box, n = interface.action.box(), interface.action.size
         self._half = (box.high - box.low) / 2
         self._middle = (box.high + box.low) / 2
-        self._limit = self._half if recipe.base == NO_BASE else np.full(n, recipe.limit)
-        self._period = plant.control_period
-        self._at = plant.observation.slices
-        own = {field.name: field for field in plant.observation.fields}
+        self._limit = self._half if config.base == NO_BASE else np.full(n, config.action_scale)
+        self._period = interface.control_period
+        self._at = interface.observation.slices
+        own = {field.name: field for field in interface.observation.fields}
         self.actions: tuple[str, ...] = tuple(f"u{i + 1}" for i in range(n))
         self.features = Layout(
             (
@@ -62,30 +62,30 @@ class JointCoupling:
             )
         )
 
-    def start(self, observation: Array) -> JointMemory:
+    def start(self, observation: Array) -> JointAdapterState:
         nothing = np.zeros((*observation.shape[:-1], len(self.actions)), observation.dtype)
-        return JointMemory(nothing, FilterMemory(nothing, nothing))
+        return JointAdapterState(nothing, FilterState(nothing, nothing))
 
     def observe(
-        self, observation: Array, inside: Mapping[str, Array], memory: JointMemory
-    ) -> tuple[Array, JointMemory]:
+        self, observation: Array, inside: Mapping[str, Array], state: JointAdapterState
+    ) -> tuple[Array, JointAdapterState]:
         del inside
         at = self._at
         e = observation[..., at["q_ref"]] - observation[..., at["q"]]
         ed = observation[..., at["qd_ref"]] - observation[..., at["qd"]]
-        parts = [e, ed, *(observation[..., at[name]] for name in PASSED_ON), memory.action]
-        return np.concatenate(parts, axis=-1, dtype=observation.dtype), memory
+        parts = [e, ed, *(observation[..., at[name]] for name in PASSED_ON), state.action]
+        return np.concatenate(parts, axis=-1, dtype=observation.dtype), state
 
-    def decide(self, memory: JointMemory, action: Array) -> JointMemory:
-        return memory._replace(action=np.minimum(np.maximum(action, -1.0), 1.0).astype(memory.action.dtype))
+    def set_action(self, state: JointAdapterState, action: Array) -> JointAdapterState:
+        return state._replace(action=np.minimum(np.maximum(action, -1.0), 1.0).astype(state.action.dtype))
 
-    def advance(self, memory: JointMemory) -> tuple[Array, JointMemory]:
-        after = second_order(memory.filter, self._limit * memory.action, FILTER_RATE, 1.0, self._period)
-        return after.value.astype(memory.action.dtype, copy=False), memory._replace(filter=after)
+    def next_residual(self, state: JointAdapterState) -> tuple[Array, JointAdapterState]:
+        after = second_order(state.filter, self._limit * state.action, FILTER_RATE, 1.0, self._period)
+        return after.value.astype(state.action.dtype, copy=False), state._replace(filter=after)
 
-    def reward_terms(self, observation: Array, memory: JointMemory, fell: Any) -> dict[str, Array]:
+    def reward_terms(self, observation: Array, state: JointAdapterState, fell: Any) -> dict[str, Array]:
         del fell
-        at, action = self._at, memory.action
+        at, action = self._at, state.action
         e = observation[..., at["q_ref"]] - observation[..., at["q"]]
         share = (observation[..., at["tau_applied"]] - self._middle) / self._half
         return {

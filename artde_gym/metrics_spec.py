@@ -13,7 +13,7 @@ Fields: TypeAlias = Mapping[str, Array]
 
 
 @dataclasses.dataclass(frozen=True)
-class Tracked:
+class TrackedSignal:
     """A vector that is meant to follow its reference.
 
     Attributes:
@@ -33,7 +33,7 @@ class Tracked:
 
 
 @dataclasses.dataclass(frozen=True)
-class Effort:
+class EffortSignal:
     """Forces or torques of one unit.
 
     Attributes:
@@ -60,46 +60,46 @@ class Watched:
         unit: in which it is reported, likewise.
         scale: how many of it make one SI unit.
         size: observations and told entries of `info` -> values (...), in SI; NaN where there is none.
-        band: value that counts as settled after a push, in SI; infinite where settling means nothing.
+        settling_band: value that counts as settled after a push, in SI; infinite where settling means nothing.
     """
 
     name: str
     unit: str
     scale: float
     size: Callable[[Fields], Array]
-    band: float
+    settling_band: float
 
 
 @dataclasses.dataclass(frozen=True)
-class Tracking:
+class MetricsSpec:
     """Everything that metrics have to know of an environment.
 
     Attributes:
         errors: the first one is what recovery, IAE and ITAE are measured by.
         norm: whether that one's components make one number by their Euclidean norm (of a vector in space) or by their
             root mean square (of joints).
-        band: size of error that counts as recovered, in SI.
+        settling_band: size of error that counts as recovered, in SI.
         efforts: what was applied.
         power: observations -> power spent (...), W.
-        limited: field whose values saturate at its bounds.
-        near: share of the field's range that counts as at the bound; a lag approaches it without reaching it.
+        saturated_field: field whose values saturate at its bounds.
+        saturation_margin: share of the field's range that counts as at the bound; a lag approaches it without reaching it.
         tde_errors: column -> diagnostic of a policy that is an error of time-delay estimation.
-        means: column -> diagnostic of a policy, one number, whose mean is reported.
-        told: entries of `info` that belong into an episode's traces too, numbers each.
+        diagnostic_means: column -> diagnostic of a policy, one number, whose mean is reported.
+        recorded_info: entries of `info` that belong into an episode's traces too, numbers each.
         watched: what else is measured, from observations and told entries.
         speed: observations -> speed of travel (...), m/s, where a cost of transport makes sense.
     """
 
-    errors: tuple[Tracked, ...]
+    errors: tuple[TrackedSignal, ...]
     norm: bool
-    band: float
-    efforts: tuple[Effort, ...]
+    settling_band: float
+    efforts: tuple[EffortSignal, ...]
     power: Callable[[Fields], Array]
-    limited: str
-    near: float
+    saturated_field: str
+    saturation_margin: float
     tde_errors: Mapping[str, str]
-    means: Mapping[str, str]
-    told: tuple[str, ...] = ()
+    diagnostic_means: Mapping[str, str]
+    recorded_info: tuple[str, ...] = ()
     watched: tuple[Watched, ...] = ()
     speed: Callable[[Fields], Array] | None = None
 

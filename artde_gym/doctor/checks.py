@@ -11,15 +11,15 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
-from artde_gym.doctor.outcome import Outcome
-from artde_gym.errors import UnknownNameError, among
+from artde_gym.doctor.check_result import CheckResult
+from artde_gym.errors import UnknownNameError, suggest_names
 from artde_gym.registration import resolved
 from artde_gym.registry import pointed
 from artde_gym.sim.factory import ENGINES
 
 
 class Check(NamedTuple):
-    """A check: `entry_point` is "module:function", called with `arguments` and giving a list of `Outcome`s.
+    """A check: `entry_point` is "module:function", called with `arguments` and giving a list of `CheckResult`s.
 
     Without a title, it is the first line of the function's docstring.
     """
@@ -55,10 +55,10 @@ class Report(NamedTuple):
     """What one check found, under its title."""
 
     title: str
-    outcomes: list[Outcome]
+    outcomes: list[CheckResult]
 
 
-def examine(names: Sequence[str] | None = None, *, workers: int | None = None) -> Iterator[tuple[str, Report]]:
+def run_checks(names: Sequence[str] | None = None, *, workers: int | None = None) -> Iterator[tuple[str, Report]]:
     """Run some checks, or all; yields each report in the order of `CHECKS` as soon as it and those before it are done.
 
     Args:
@@ -71,7 +71,7 @@ def examine(names: Sequence[str] | None = None, *, workers: int | None = None) -
     chosen = list(CHECKS if names is None else names)
     for name in chosen:
         if name not in CHECKS:
-            raise UnknownNameError("check", name, among(name, CHECKS))
+            raise UnknownNameError("check", name, suggest_names(name, CHECKS))
     with ThreadPoolExecutor(workers or os.cpu_count() or 1) as pool:
         running = {name: pool.submit(_isolated, name, CHECKS[name]) for name in chosen}
         for name, future in running.items():
@@ -92,7 +92,7 @@ def _isolated(name: str, check: Check) -> Report:
     else:
         with contextlib.suppress(EOFError):  # it died without a word
             title, outcomes = ours.recv()
-            found = Report(title or name, [Outcome(*values) for values in outcomes])
+            found = Report(title or name, [CheckResult(*values) for values in outcomes])
     process.join()
     if found is not None:
         return found
@@ -100,7 +100,7 @@ def _isolated(name: str, check: Check) -> Report:
     if late:
         said, remedy = f"no answer in {PATIENCE:g} s", "end other programs and try again"
     title = check.title or name
-    return Report(title, [Outcome(title, "failed", said, remedy)])
+    return Report(title, [CheckResult(title, "failed", said, remedy)])
 
 
 def _run(check: Check, channel: Any) -> None:
@@ -119,11 +119,11 @@ def _title_of(check: Check) -> str:
     return ""
 
 
-def _attempted(check: Check) -> list[Outcome]:
+def _attempted(check: Check) -> list[CheckResult]:
     """What a check finds, an exception being a finding."""
     try:
         return resolved(check.entry_point)(*check.arguments)
     except Exception as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
         found = f"{type(error).__name__}: {error} ({os.path.basename(place.filename)}:{place.lineno})"
-        return [Outcome("the check itself", "failed", found, REPORT_IT)]
+        return [CheckResult("the check itself", "failed", found, REPORT_IT)]

@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 Status = Literal["ok", "missing", "failed"]
 
 
-class Outcome(NamedTuple):
+class CheckResult(NamedTuple):
     """One line of a diagnosis.
 
     Attributes:

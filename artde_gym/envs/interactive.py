@@ -9,20 +9,20 @@ from typing import Any, ClassVar, Self
 
 from artde_gym.disturbances.numeric import Words, numeric
 from artde_gym.disturbances.schedule import Push, Schedule
-from artde_gym.envs.closed import CLOSED, refuse
-from artde_gym.envs.counted import Counted
+from artde_gym.envs.closed_env import CLOSED, require_open
+from artde_gym.envs.step_limit import StepLimitMixin
 from artde_gym.errors import RobotError
 from artde_gym.info import EpisodeInfo
 from artde_gym.multibody.spec import RobotSpec, Vector
 from artde_gym.sim.engine import Engine
 
 
-class Live(Counted, abc.ABC):
+class InteractiveMixin(StepLimitMixin, abc.ABC):
     """A part of an environment: pushes and drops that nobody planned, and a look at its world."""
 
     nominal_robot: RobotSpec
     _engine: Engine
-    _realised: Mapping[str, Any]
+    _sampled: Mapping[str, Any]
     words: Words
     fall_reasons: ClassVar[Sequence[str]]
 
@@ -55,20 +55,20 @@ class Live(Counted, abc.ABC):
         """Drop the payload now; False if there is none."""
         dropped = self.schedule.drop(self.elapsed)
         if dropped:
-            payload = {**self._realised["payload"], "drop": self.elapsed * self._engine.time_step}
-            self._sample({**self._realised, "payload": payload})
+            payload = {**self._sampled["payload"], "detach_time": self.elapsed * self._engine.time_step}
+            self._sample({**self._sampled, "payload": payload})
         return dropped
 
     @property
     def sampled_disturbances(self) -> dict[str, Any]:
         """The disturbances of this episode in the grammar of `artde_gym.disturbances`, to be given to `reset` again."""
-        return copy.deepcopy(dict(self._realised))
+        return copy.deepcopy(dict(self._sampled))
 
-    def _sample(self, realised: Mapping[str, Any]) -> None:
-        self._realised, self._told = realised, EpisodeInfo(numeric(realised, self.words), self.fall_reasons)
+    def _sample(self, sampled: Mapping[str, Any]) -> None:
+        self._sampled, self._told = sampled, EpisodeInfo(numeric(sampled, self.words), self.fall_reasons)
 
     def _require_open(self) -> None:
-        refuse(closed=self._engine is CLOSED)
+        require_open(closed=self._engine is CLOSED)
 
     @property
     def engine(self) -> Engine:

@@ -18,7 +18,7 @@ class _Spec:
             env._spec.max_episode_steps = env._last
 
 
-class Counted:
+class StepLimitMixin:
     """A part of an environment whose episodes end after a number of steps that follows from its arguments."""
 
     spec: Any = _Spec()

@@ -15,24 +15,24 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from artde_gym.arguments import real_array, seed_number
+from artde_gym.arguments import check_seed, real_array
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.numeric import Words, numeric
 from artde_gym.disturbances.schedule import EVENTS
-from artde_gym.envs.closed import refuse
-from artde_gym.envs.counted import Counted
+from artde_gym.envs.closed_env import require_open
 from artde_gym.envs.options import disturbances_in, warn_of_idle
+from artde_gym.envs.step_limit import StepLimitMixin
 from artde_gym.errors import ActionError, OptionError
 from artde_gym.info import FELL, REWARD, Columns, Mask, SampledTable, cleared, masked, prefixed
 from artde_gym.layout import Layout
+from artde_gym.metrics_spec import MetricsSpec
 from artde_gym.sim.factory import resolve_engine
-from artde_gym.tracking import Tracking
 
 Order = Literal["C", "F"]
 
 
-class BatchEnv(Counted, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
+class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
     """Many environments in one. Each has a generator of its own, and does the same whatever the number beside it.
 
     A subclass says what happens; observations and actions are (n, size), in its `order` of memory.
@@ -57,7 +57,7 @@ class BatchEnv(Counted, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
     action_layout: Layout
     observation_layout: Layout
     robot_name: ClassVar[str]
-    tracking: ClassVar[Tracking]
+    metrics_spec: ClassVar[MetricsSpec]
     reward_scales: ClassVar[Mapping[str, float]]
     fall_reasons: ClassVar[Sequence[str]]
     allowed_action: ClassVar[str]
@@ -99,7 +99,7 @@ class BatchEnv(Counted, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
         self._np_random, self._np_random_seed = map(list, zip(*seeded, strict=True))
         self._k = np.zeros(num_envs, np.int64)
         self._over: Mask | None = None  # where an episode has ended; None before the first reset
-        self._realised: list[Mapping[str, Any]] = [{}] * num_envs
+        self._sampled: list[Mapping[str, Any]] = [{}] * num_envs
         self._table = SampledTable(num_envs)
 
     @abc.abstractmethod
@@ -108,7 +108,7 @@ class BatchEnv(Counted, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
 
     @abc.abstractmethod
     def _start(self, drawn: Mapping[int, Mapping[str, Any]]) -> None:
-        """Begin episodes in some environments, with realised disturbances."""
+        """Begin episodes in some environments, with sampled disturbances."""
 
     @abc.abstractmethod
     def _advance(self, commands: Array, goes_on: Mask) -> dict[int, list[str]]:
@@ -139,7 +139,7 @@ class BatchEnv(Counted, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
     @property
     def sampled_disturbances(self) -> list[dict[str, Any]]:
         """The disturbances of each episode in the grammar of `artde_gym.disturbances`."""
-        return [copy.deepcopy(dict(realised)) for realised in self._realised]
+        return [copy.deepcopy(dict(sampled)) for sampled in self._sampled]
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
         """An attribute, once for each environment."""
@@ -158,7 +158,7 @@ class BatchEnv(Counted, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
             OptionError: for an unknown option or value, or a scenario that needs another environment.
             DisturbanceError: for a malformed disturbance.
         """
-        refuse(closed=self.closed)
+        require_open(closed=self.closed)
         if not isinstance(options, Mapping | None):
             raise OptionError("reset options", options, "a mapping")
         options = dict(options or {})
@@ -188,7 +188,7 @@ class BatchEnv(Counted, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
             gymnasium.error.ResetNeeded: before the first reset.
             gymnasium.error.ClosedEnvironmentError: after `close`.
         """
-        refuse(closed=self.closed)
+        require_open(closed=self.closed)
         if self._over is None:
             raise gym.error.ResetNeeded("the episodes have not begun: call reset()")
         over, goes_on = self._over, ~self._over
@@ -272,24 +272,24 @@ class BatchEnv(Counted, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
 
     def _seeds(self, given: Any) -> list[int | None]:
         if not isinstance(given, Sequence) and np.ndim(given) == 0:
-            first = seed_number("seed", given)
+            first = check_seed("seed", given)
             return [first + i for i in range(self.num_envs)] if first is not None else [None] * self.num_envs
         if isinstance(given, str) or len(given) != self.num_envs:
             raise OptionError("seed", given, f"None, a number, or {self.num_envs} of them, one for each environment")
-        return [seed_number("seed", seed) for seed in given]
+        return [check_seed("seed", seed) for seed in given]
 
     def _begin(self, mask: Mask) -> None:
         """Begin new episodes where the mask is true."""
         if not mask.any():
             return
-        drawn = {i: self._disturbances.draw(self._np_random[i]) for i in np.flatnonzero(mask).tolist()}
+        drawn = {i: self._disturbances.sample(self._np_random[i]) for i in np.flatnonzero(mask).tolist()}
         self._k[mask] = 0
         self._start(drawn)
         if mask.all():
             self._table = SampledTable(self.num_envs)  # without the room that other disturbances have needed
-        for i, realised in drawn.items():
-            self._realised[i] = realised
-        self._table.enter({i: numeric(realised, self.words) for i, realised in drawn.items()})
+        for i, sampled in drawn.items():
+            self._sampled[i] = sampled
+        self._table.enter({i: numeric(sampled, self.words) for i, sampled in drawn.items()})
 
     def _info(self, mask: Mask, told: Columns) -> dict[str, Any]:
         """Tell of the environments in a mask what policies are not meant to see.

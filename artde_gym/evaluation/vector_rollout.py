@@ -25,13 +25,13 @@ from artde_gym.info import fall_reason
 BLOCK = 4096  # samples of all episodes together that metrics take in at once: a call has its price
 
 
-def run_batch(
+def run_vector(
     env: Any,
     policy: Policy,
     seeds: Sequence[int],
     *,
-    trace_hz: float = 100.0,
-    traced: int = 0,
+    record_hz: float = 100.0,
+    record_episodes: int = 0,
     phases: Sequence[Span] = (),
     on_progress: Callable[[float], None] | None = None,
 ) -> list[Episode]:
@@ -44,13 +44,13 @@ def run_batch(
         env: a vector environment of this project, of as many environments as there are seeds.
         policy: takes the observations of all of them at once.
         seeds: of the episodes.
-        trace_hz: rate of the traces, at most the control rate; infinite for every sample.
-        traced: the first so many episodes leave traces.
+        record_hz: rate of the traces, at most the control rate; infinite for every sample.
+        record_episodes: the first so many episodes leave traces.
         phases: see `Metrics`.
         on_progress: called with the simulated time (s) about once a simulated second.
     """
     period: float = env.control_period
-    stride = max(1, round(1.0 / (trace_hz * period)))
+    stride = max(1, round(1.0 / (record_hz * period)))
     report_every = max(1, round(PROGRESS_INTERVAL / period))
     diagnose = getattr(policy, "diagnostics", None)
     looks = diagnosed_every(env, stride)
@@ -63,11 +63,11 @@ def run_batch(
     steps, total = np.zeros(len(seeds), dtype=np.int64), np.zeros(len(seeds))
     reasons: dict[int, str] = {}
 
-    traces = _Traces(env, traced, stride)
+    traces = _Traces(env, record_episodes, stride)
     traces.observe(0, observation, info)
     block: list[Array] = []
     told: list[dict[str, Array]] = []
-    names = env.tracking.told if env.tracking.watched else ()
+    names = env.metrics_spec.recorded_info if env.metrics_spec.watched else ()
     insides: list[dict[str, Array]] = []
     state, episode_start, k = None, live, 0
     while live.any():
@@ -98,7 +98,7 @@ def run_batch(
     episodes = []
     for i, row in enumerate(metrics.rows(np.isin(np.arange(len(seeds)), list(reasons)))):
         row = row_of(reasons.get(i), float(steps[i] * period), float(total[i]), row, disturbances[i])
-        episodes.append(Episode(row, traces.of(i, int(steps[i])) if i < traced else {}))
+        episodes.append(Episode(row, traces.of(i, int(steps[i])) if i < record_episodes else {}))
     return episodes
 
 
@@ -115,7 +115,7 @@ class _Traces:
         """Keep what is seen after so many steps."""
         if self._count and step % self._stride == 0:
             self._observations.append(observation[: self._count].copy())
-            told = self._env.tracking.told
+            told = self._env.metrics_spec.recorded_info
             self._told.append({name: np.array(info[name][: self._count]) for name in told})
 
     def diagnose(self, step: int, values: Mapping[str, Array]) -> None:

@@ -15,11 +15,11 @@ from artde_gym.robots.ojas.task import OBSERVATION, TIME_STEP, Walk
 from artde_gym.sim.engine import World
 
 
-class Course:
-    """The disturbances of one episode: `start`, `settled`, and then for each control period `begin` and its steps.
+class EpisodeDisturbances:
+    """The disturbances of one episode: `start`, `begin_walk`, and then for each control period `begin_period` and its steps.
 
     Args:
-        realised: drawn disturbances.
+        sampled: drawn disturbances.
         walk: that they disturb.
         rng: of the environment.
 
@@ -28,13 +28,13 @@ class Course:
         sensing: of observations; None without any.
     """
 
-    def __init__(self, realised: Mapping[str, Any], walk: Walk, rng: np.random.Generator) -> None:
-        kinds = realised.keys()
-        self.schedule = Schedule(realised, TIME_STEP)
+    def __init__(self, sampled: Mapping[str, Any], walk: Walk, rng: np.random.Generator) -> None:
+        kinds = sampled.keys()
+        self.schedule = Schedule(sampled, TIME_STEP)
         joints = walk.nominal_robot.actuated
-        self._actuation = None if kinds.isdisjoint(Actuation.KINDS) else Actuation(realised, joints, TIME_STEP)
+        self._actuation = None if kinds.isdisjoint(Actuation.KINDS) else Actuation(sampled, joints, TIME_STEP)
         self.sensing = (
-            None if kinds.isdisjoint(Sensing.KINDS) else Sensing(realised, OBSERVATION, walk.control_period, rng)
+            None if kinds.isdisjoint(Sensing.KINDS) else Sensing(sampled, OBSERVATION, walk.control_period, rng)
         )
         self._target = self._total = np.zeros(len(joints))
         self._substeps = walk.substeps
@@ -43,21 +43,21 @@ class Course:
         """Bring about what is there while the robot settles."""
         self.schedule.start(world)
 
-    def settled(self, tau: Array) -> None:
+    def begin_walk(self, tau: Array) -> None:
         """The walk begins, with torques `tau` (n,) (Nm)."""
         if self._actuation is not None:
             self._actuation.start(tau)
 
-    def wakes(self, step: int) -> int:
+    def next_event_step(self, step: int) -> int:
         """The first time step from `step` on in which commanded torques are not all that happens."""
         return step if self._actuation is not None else self.schedule.next(step)
 
-    def begin(self, command: Array) -> None:
+    def begin_period(self, command: Array) -> None:
         """A control period begins with torques `command` (n,) (Nm) within their bounds."""
         self._target = command if self._actuation is None else self._actuation.target(command)
         self._total = 0.0
 
-    def act(self, step: int, world: World, events: list[str]) -> Array:
+    def apply(self, step: int, world: World, events: list[str]) -> Array:
         """Disturb a world for a time step; returns the torques (n,) (Nm) that act, and adds to `events`."""
         events += self.schedule.apply(step, world)
         if self._actuation is None:
