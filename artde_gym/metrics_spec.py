@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import TypeAlias
 
 from artde_gym.arrays import Array
+from artde_gym.deprecation import renamed_arguments
 
 Fields: TypeAlias = Mapping[str, Array]
 """Observations by field name, each (..., size)."""
@@ -51,8 +52,17 @@ class EffortSignal:
     axes: Mapping[str, int]
 
 
+@renamed_arguments(
+    {
+        "band": "settling_band",
+        "limited": "saturated_field",
+        "means": "diagnostic_means",
+        "near": "saturation_margin",
+        "told": "recorded_info",
+    }
+)
 @dataclasses.dataclass(frozen=True)
-class Watched:
+class WatchedSignal:
     """A size that has no reference of its own, such as a swing.
 
     Attributes:
@@ -82,7 +92,8 @@ class MetricsSpec:
         efforts: what was applied.
         power: observations -> power spent (...), W.
         saturated_field: field whose values saturate at its bounds.
-        saturation_margin: share of the field's range that counts as at the bound; a lag approaches it without reaching it.
+        saturation_margin: share of the field's range that counts as at the bound; a lag approaches it without
+            reaching it.
         tde_errors: column -> diagnostic of a policy that is an error of time-delay estimation.
         diagnostic_means: column -> diagnostic of a policy, one number, whose mean is reported.
         recorded_info: entries of `info` that belong into an episode's traces too, numbers each.
@@ -100,7 +111,7 @@ class MetricsSpec:
     tde_errors: Mapping[str, str]
     diagnostic_means: Mapping[str, str]
     recorded_info: tuple[str, ...] = ()
-    watched: tuple[Watched, ...] = ()
+    watched: tuple[WatchedSignal, ...] = ()
     speed: Callable[[Fields], Array] | None = None
 
     @property

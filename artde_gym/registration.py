@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import gymnasium as gym
 
+from artde_gym.deprecation import renamed_arguments
 from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from artde_gym.kit import ROBOTS
 from artde_gym.registry import Registry
@@ -22,7 +23,7 @@ from artde_gym.registry import Registry
 class ControllerSpec:
     """A controller by name: `entry_point` is "module:function", called as function(env, **kwargs).
 
-    `tuning_space`, in the same form and called the same way, gives the gains that tuning may change; None if there are none.
+    `tuning_space`, in the same form and called the same way, gives the gains that tuning may change; None without any.
     """
 
     name: str
@@ -51,6 +52,7 @@ REPLACEABLE = "preset"
 """The one fixed argument that an override may replace: it says from which gains to start, not which law it is."""
 
 
+@renamed_arguments({"search": "tuning_space"})
 def register_controller(
     name: str, entry_point: str, *, text: str = "", tuning_space: str | None = None, **kwargs: Any
 ) -> None:
@@ -61,8 +63,8 @@ def register_controller(
         entry_point: "module:function"; the function is called as function(env, **kwargs, **overrides) and returns a
             policy with Stable-Baselines3's `predict`.
         text: one line for listings.
-        tuning_space: "module:function" for `artde-gym tune`; called as function(env, **kwargs), it returns a mapping from
-            gains to `GainRange`.
+        tuning_space: "module:function" for `artde-gym tune`; called as function(env, **kwargs), it returns a mapping
+            from gains to `GainRange`.
         kwargs: fixed arguments of the function, which no override replaces (but for a `preset`).
 
     Raises:
@@ -120,7 +122,8 @@ def tuning_space(name: str, env: Any) -> dict[str, GainRange]:
     """The gains of the controller called `name` that tuning may change, for the robot of an environment.
 
     Raises:
-        UnknownNameError: if no controller has this name, its gains have no ranges, or `tuning_space` cannot be imported.
+        UnknownNameError: if no controller has this name, its gains have no ranges, or `tuning_space` cannot be
+            imported.
     """
     known = _known(name)
     if known.tuning_space is None:

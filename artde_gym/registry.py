@@ -7,6 +7,7 @@ from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
+from artde_gym.deprecation import GROUPS, warn
 from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 
 T = TypeVar("T")
@@ -22,7 +23,10 @@ def pointed(group: str) -> dict[str, str]:
 
 def _in_order(group: str) -> list[EntryPoint]:
     own = "artde-gym"
-    return sorted(entry_points(group=group), key=lambda p: (p.dist is None or p.dist.name != own, p.name))
+    old = entry_points(group=GROUPS[group]) if group in GROUPS else ()
+    for point in old:
+        warn(f"group {GROUPS[group]} of the entry point {point.name}", group)
+    return sorted([*entry_points(group=group), *old], key=lambda p: (p.dist is None or p.dist.name != own, p.name))
 
 
 class Registry(Mapping[str, T], Generic[T]):

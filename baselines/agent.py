@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from artde_gym.deprecation import renamed_arguments
 from artde_gym.layout import Layout
 from artde_gym.registry import Registry
 from baselines.action_adapter import ActionAdapter
@@ -14,6 +15,7 @@ from baselines.task import Task
 JOINTS = "joints"
 
 
+@renamed_arguments({"coupling": "adapter", "channels": "action_modes", "hold": "decision_period"})
 @dataclasses.dataclass(frozen=True)
 class Agent:
     """How a residual acts on one robot, and what it is trained on.

@@ -19,6 +19,7 @@ import numpy as np
 
 import artde_gym
 from artde_gym.arguments import check_bool, check_file_name, check_number, wrap_read_errors
+from artde_gym.deprecation import current_residual
 from artde_gym.layout import Layout
 from baselines.errors import PolicyFileError
 from baselines.network import Network
@@ -108,7 +109,7 @@ def _saved(description: Mapping[str, Any], content: bytes) -> Saved:
         raise PolicyFileError("network: activation", shape["activation"], "'tanh'")
     return Saved(
         check_file_name("name", description["name"]),
-        ResidualConfig(**_of("recipe", description["recipe"], dict)),
+        ResidualConfig(**current_residual(_of("recipe", description["recipe"], dict))),
         _network(content, _sizes(shape["sizes"]), check_bool("network: squashed", shape["squashed"])),
         _of("features_sha256", description["features_sha256"], str),
         tuple(_of("actions", name, str) for name in _of("actions", description["actions"], list)),

@@ -1,6 +1,6 @@
 """A base controller with a residual on top: what training environments and trained policies share.
 
-An agent decides every `ResidualConfig.decision_period` seconds, on features of the observation and of the base; its action becomes an
+An agent decides every `decision_period` seconds, on features of the observation and of the base; its action becomes an
 acceleration du that the base adds to the one it desires, at every control period.
 """
 

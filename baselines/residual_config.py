@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from artde_gym.arguments import check_bool, check_number
+from artde_gym.deprecation import RESIDUAL, renamed_arguments
 from artde_gym.errors import OptionError, suggest_names
 from artde_gym.kit import ROBOTS
 from baselines.agent import agent_of
@@ -18,6 +19,7 @@ LONGEST = 10.0  # s, of a hold
 LARGEST = 1e6  # of a limit
 
 
+@renamed_arguments(RESIDUAL)
 @dataclasses.dataclass(frozen=True)
 class ResidualConfig:
     """A base controller, and what an agent's action in [-1, 1]^n does on top of it.
@@ -26,11 +28,12 @@ class ResidualConfig:
         robot: by the environment's `robot_name`.
         base: registered name of the base controller; "none", and the action is the force itself.
         gains: in place of the base's preset's.
-        action_mode: "synergies" of the legs, "wide-synergies" or raw "joints" (biped), the "attitude" loop, the "position"
-            loop or both, the "cascade" (quadrotor), "joints" of any other robot; see the robots' modules.
-        decision_period: time between two decisions (s), a whole number of control periods; 0 for as many as come nearest to
-            `DECISION`, where the robot has no default.
-        action_scale: largest size of each component of du (rad/s^2, m/s^2); that of the attitude loop is `TURNING` times it.
+        action_mode: "synergies" of the legs, "wide-synergies" or raw "joints" (biped), the "attitude" loop, the
+            "position" loop or both, the "cascade" (quadrotor), "joints" of any other robot; see the robots' modules.
+        decision_period: time between two decisions (s), a whole number of control periods; 0 for as many as come
+            nearest to `DECISION`, where the robot has no default.
+        action_scale: largest size of each component of du (rad/s^2, m/s^2); `TURNING` times that in the attitude
+            loop.
         gated: whether the residual fades in by tilt and velocity error (biped), or is there all the time.
 
     Raises:

@@ -25,8 +25,8 @@ RESIDUAL = "residual_"  # before names of the terms of its reward
 class ResidualEnv(gym.Wrapper[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]):
     """An environment of this project under a base controller, whose residual is the action.
 
-    One step is one decision: `ResidualConfig.decision_period` seconds, in which the base controls at its own rate. Zero action is the base
-    controller alone, bit for bit.
+    One step is one decision: `decision_period` seconds, in which the base controls at its own rate. Zero action is the
+    base controller alone, bit for bit.
 
     Args:
         env: the environment, wrapped or not.
@@ -44,7 +44,7 @@ class ResidualEnv(gym.Wrapper[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[
     `residual_` before its name.
 
     Raises:
-        OptionError: if the configuration is another robot's, or `decision_period` is no whole number of control periods.
+        OptionError: if `config` is another robot's, or `decision_period` is no whole number of control periods.
     """
 
     def __init__(self, env: gym.Env[Any, Any], config: ResidualConfig) -> None:

@@ -18,6 +18,7 @@ import numpy as np
 
 import artde_gym
 from artde_gym.arguments import check_number, wrap_read_errors
+from artde_gym.deprecation import current_configuration, renamed_arguments
 from artde_gym.errors import suggest_names
 from artde_gym.evaluation import evaluate
 from artde_gym.evaluation.cells import cells_of, validate_cell
@@ -40,6 +41,7 @@ LABELS = {"cma-es": "balance"}
 """What stands behind the base's name in that of a policy, where it is not the algorithm."""
 
 
+@renamed_arguments({"recipe": "config"})
 @dataclasses.dataclass(frozen=True)
 class Training:
     """What is trained; the same configuration continues its run, also with more steps or other options.
@@ -87,7 +89,7 @@ class Training:
         if self.level is not None:
             check_number("level", self.level, 0.0, 1.0, "a number from 0 to 1, or None")
         if self.config.robot != task(self.env_id).robot:
-            raise TrainingError("robot of the recipe", self.config.robot, f"{task(self.env_id).robot!r}")
+            raise TrainingError("robot of the residual", self.config.robot, f"{task(self.env_id).robot!r}")
         check_options(self.algo, self.options)
 
 
@@ -134,9 +136,9 @@ class Run:
         return engine is None or environment_kwargs(self.training).get("engine") == engine
 
     @property
-    def vectorized(self) -> Backend:
-        """The backend of the held-out tests."""
-        return "batch" if self.batched else "single"
+    def vectorized(self) -> bool:
+        """Whether the held-out tests run in a vector environment."""
+        return self.batched
 
     @property
     def exported(self) -> Path:
@@ -252,7 +254,7 @@ def _refuse_others(folder: Path, configuration: dict[str, Any], free: set[str]) 
     if not file.exists():
         return
     with wrap_read_errors("run", file, "a file that `train` wrote", TrainingError):
-        before = dict(json.loads(file.read_text(encoding="utf-8"))["configuration"])
+        before = current_configuration(json.loads(file.read_text(encoding="utf-8"))["configuration"])
     for name, value in configuration.items():
         if name not in {"steps", "options", "patience", *free} and before.get(name) != value:
             raise TrainingError(f"{name} of the run in {folder}", value, f"{before.get(name)!r}, or another folder")

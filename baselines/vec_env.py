@@ -34,7 +34,7 @@ class ResidualVecEnv(VecEnv):
         config: of the residual.
 
     Raises:
-        OptionError: if the configuration is another robot's, or `decision_period` is no whole number of control periods.
+        OptionError: if `config` is another robot's, or `decision_period` is no whole number of control periods.
     """
 
     def __init__(self, env: Any, config: ResidualConfig) -> None:

@@ -42,7 +42,8 @@ def make_joint_space(
     """Build the policy of a law on all joints, at preset gains with some replaced.
 
     Args:
-        env: the environment that it will drive; its observation has the fields of `controllers.laws.tracking.JointInput`.
+        env: the environment that it will drive; its observation has the fields of
+            `controllers.laws.tracking.JointInput`.
         law: name of the law.
         preset: name of its gains; None for the law's default.
         velocity_cutoff_hz: with a number, velocities are estimated from the observed angles by a low-pass of this

@@ -30,7 +30,7 @@ HELD_OUT = ((0.2, 0.45, 0.6), (0.4, 0.75, 1.2))
 FIGURES: dict[str, tuple[Any, Mapping[str, Any]]] = {
     "known": (KNOWN, {}),
     "held-out": (HELD_OUT, {}),
-    "late": (KNOWN, {"cable_delay": {"samples": 4}}),
+    "late": (KNOWN, {"cable_delay": {"steps": 4}}),
 }
 LAWS: dict[str, tuple[str, dict[str, Any]]] = {
     "TDE, thesis": ("tde", {}),

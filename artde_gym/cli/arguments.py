@@ -22,8 +22,10 @@ Seed = Annotated[int, typer.Option(help="Seed of everything.")]
 Workers = Annotated[int | None, typer.Option(help="Processes. Default: all cores.")]
 Out = Annotated[Path | None, typer.Option(help="Results folder. Default: runs/<date and time>.")]
 Vectorized = Annotated[
-    str, typer.Option(help="single: one environment after the other; batch: many at once (of the biped, in MuJoCo).")
+    bool, typer.Option("--vectorized", help="Many episodes at once in a vector environment (of the biped, in MuJoCo).")
 ]
+Backend = Annotated[str | None, typer.Option(hidden=True)]
+"""Old form of `--vectorized`."""
 Engine = Annotated[str | None, typer.Option(help=f"Physics engine: {' or '.join(ENGINES)}. Default: see `doctor`.")]
 Disturbances = Annotated[str | None, typer.Option(help="JSON, in place of those that belong to what is run.")]
 EnvKwargs = Annotated[str | None, typer.Option(help="JSON, arguments of the environment.")]
@@ -37,6 +39,25 @@ Pictures = Annotated[
     bool, typer.Option("--pictures", help="Report with pictures of the motion, pushes and falls; runs them once more.")
 ]
 Videos = Annotated[bool, typer.Option("--videos", help="Report with a video of each scenario (needs ffmpeg).")]
+
+
+def renamed_option(old: str, new: str) -> None:
+    """Tell which option has taken the place of one that was given."""
+    typer.echo(f"{old} is deprecated; use {new}", err=True)
+
+
+def vectorized_by(vectorized: bool, backend: str | None) -> bool:
+    """Tell whether episodes run in a vector environment, also by the option's old form.
+
+    Raises:
+        OptionError: for a backend that never was.
+    """
+    if backend is None:
+        return vectorized
+    if backend not in ("single", "batch"):
+        raise OptionError("--backend", backend, "'batch', 'single'; or rather --vectorized")
+    renamed_option("--backend", "--vectorized")
+    return backend == "batch"
 
 
 def names(text: str) -> list[str]:

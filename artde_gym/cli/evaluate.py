@@ -9,6 +9,7 @@ import typer
 from artde_gym.cli.arguments import (
     WALK,
     AllowMixed,
+    Backend,
     Controllers,
     Disturbances,
     Engine,
@@ -27,6 +28,8 @@ from artde_gym.cli.arguments import (
     names,
     optional_json,
     processes,
+    renamed_option,
+    vectorized_by,
 )
 from artde_gym.cli.display import Display, terminal
 from artde_gym.cli.report import show_report
@@ -49,20 +52,30 @@ def evaluate(
     workers: Workers = None,
     out: Out = None,
     vectorized: Vectorized = False,
+    backend: Backend = None,
     engine: Engine = None,
     disturbances: Disturbances = None,
     env_kwargs: EnvKwargs = None,
     gains: Gains = None,
     record_episodes: Annotated[
-        int | None, typer.Option(help="Episodes that leave signals. Default: all of them; none in the batch backend.")
+        int | None, typer.Option(help="Episodes that leave signals. Default: all of them; none if vectorized.")
     ] = None,
+    traced: Annotated[int | None, typer.Option(hidden=True)] = None,
     record_hz: Annotated[float, typer.Option(help="Rate of stored signals; inf for all of them.")] = 100.0,
+    trace_hz: Annotated[float | None, typer.Option(hidden=True)] = None,
     allow_mixed: AllowMixed = False,
     report: Report = False,
     pictures: Pictures = False,
     videos: Videos = False,
 ) -> None:
     """Compare controllers on the same seeded episodes and print them beside the thesis."""
+    vectorized = vectorized_by(vectorized, backend)
+    if traced is not None:
+        renamed_option("--traced", "--record-episodes")
+        record_episodes = traced
+    if trace_hz is not None:
+        renamed_option("--trace-hz", "--record-hz")
+        record_hz = trace_hz
     if scenario is None:
         env = env or WALK
         scenario = ",".join(main_scenarios(env)) or None
@@ -83,7 +96,7 @@ def evaluate(
             disturbances=optional_json("--disturbances", disturbances),
             env_kwargs=kwargs,
             gains=json_object("--gains", gains),
-            vectorized=vectorized,  # pyright: ignore[reportArgumentType]  # checked there
+            vectorized=vectorized,
             record_episodes=record_episodes,
             record_hz=record_hz,
             allow_mixed=allow_mixed,

@@ -8,6 +8,7 @@ import typer
 
 from artde_gym.cli.arguments import (
     AllowMixed,
+    Backend,
     Controllers,
     Disturbances,
     Engine,
@@ -24,6 +25,7 @@ from artde_gym.cli.arguments import (
     names,
     optional_json,
     processes,
+    vectorized_by,
 )
 from artde_gym.cli.display import Display, terminal
 from artde_gym.cli.report import show_report
@@ -53,6 +55,7 @@ def frontier(
     env_kwargs: EnvKwargs = None,
     gains: Gains = None,
     vectorized: Vectorized = False,
+    backend: Backend = None,
     allow_mixed: AllowMixed = False,
     report: Report = False,
 ) -> None:
@@ -76,7 +79,7 @@ def frontier(
             disturbances=optional_json("--disturbances", disturbances),
             env_kwargs=kwargs,
             gains=json_object("--gains", gains),
-            vectorized=vectorized,  # pyright: ignore[reportArgumentType]  # checked there
+            vectorized=vectorized_by(vectorized, backend),
             allow_mixed=allow_mixed,
             on_progress=lambda value, update: display(update, f"{vary} {value:g}"),
         )

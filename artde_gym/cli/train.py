@@ -9,7 +9,16 @@ from typing import Annotated
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from artde_gym.cli.arguments import Engine, EnvKwargs, Report, Seed, environment_kwargs, json_object, processes
+from artde_gym.cli.arguments import (
+    Engine,
+    EnvKwargs,
+    Report,
+    Seed,
+    environment_kwargs,
+    json_object,
+    processes,
+    renamed_option,
+)
 from artde_gym.cli.display import terminal, words
 from artde_gym.cli.report import show_report
 from artde_gym.errors import OptionError
@@ -26,7 +35,9 @@ def train(
     action_mode: Annotated[
         str, typer.Option(help="What an action means. Default: the robot's; see the model cards.")
     ] = "",
-    action_scale: Annotated[float, typer.Option(help="Largest residual. Default: the channel's.")] = 0.0,
+    action_scale: Annotated[float, typer.Option(help="Largest residual. Default: the action mode's.")] = 0.0,
+    channel: Annotated[str | None, typer.Option(hidden=True)] = None,
+    limit: Annotated[float | None, typer.Option(hidden=True)] = None,
     gated: Annotated[bool, typer.Option(help="Fade the biped's residual in by tilt and velocity error.")] = True,
     patience: Annotated[int, typer.Option(help="Held-out tests without a better score that end the run.")] = 20,
     test_every: Annotated[int, typer.Option(help="Intervals (or generations) between two held-out tests.")] = 4,
@@ -41,6 +52,12 @@ def train(
     from baselines.run import Training
     from baselines.tasks import task
 
+    if channel is not None:
+        renamed_option("--channel", "--action-mode")
+        action_mode = channel
+    if limit is not None:
+        renamed_option("--limit", "--action-scale")
+        action_scale = limit
     kwargs = environment_kwargs(env_kwargs, engine)
     training = Training(
         env,

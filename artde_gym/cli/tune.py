@@ -9,6 +9,7 @@ import typer
 from artde_gym.cli.arguments import (
     WALK,
     AllowMixed,
+    Backend,
     Controllers,
     Disturbances,
     Engine,
@@ -22,6 +23,7 @@ from artde_gym.cli.arguments import (
     names,
     optional_json,
     processes,
+    vectorized_by,
 )
 from artde_gym.cli.display import Display, terminal
 from artde_gym.studies import tune as run_tuning
@@ -44,6 +46,7 @@ def tune(
     workers: Workers = None,
     out: Out = None,
     vectorized: Vectorized = False,
+    backend: Backend = None,
     engine: Engine = None,
     disturbances: Disturbances = None,
     env_kwargs: EnvKwargs = None,
@@ -66,7 +69,7 @@ def tune(
             out=folder_of(out),
             disturbances=optional_json("--disturbances", disturbances),
             env_kwargs=kwargs,
-            vectorized=vectorized,  # pyright: ignore[reportArgumentType]  # checked there
+            vectorized=vectorized_by(vectorized, backend),
             allow_mixed=allow_mixed,
             on_progress=lambda what, update: display(update, what),
         )

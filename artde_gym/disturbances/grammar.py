@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from artde_gym.deprecation import current_disturbances, warn
 from artde_gym.disturbances.kinds import ALL, DISTURBANCES, NEVER, DisturbanceSpec, Parameter, allowed, in_order
 from artde_gym.errors import DisturbanceError, suggest_names
 from artde_gym.kit import PAYLOAD
@@ -60,15 +61,16 @@ class Disturbances:
             return cls()
         if not isinstance(given, Mapping):
             raise DisturbanceError("disturbances", given, "a mapping of kinds to their parameters")
+        named: Mapping[str, Any] = current_disturbances(given, told=True)
         honored = [kind.name for kind in DISTURBANCES.values() if kind.honored_by(robot)]
-        for name in given:
+        for name in named:
             if name not in honored:
                 of_robot = f"{robot} honors " if name in DISTURBANCES else ""
                 raise DisturbanceError("disturbances", name, of_robot + suggest_names(name, honored))
         entries: list[tuple[str, Mapping[str, Any]]] = []
         for kind in in_order():
-            if (name := kind.name) in given:
-                for path, entry in _entries(kind, given[name]):
+            if (name := kind.name) in named:
+                for path, entry in _entries(kind, named[name]):
                     parsed = _parse_entry(kind, entry, path, {"site": sites, "joint": (*joints, ALL)}, robot)
                     entries += [(name, one) for one in _each_joint(parsed, joints)]
         _require_load(entries)
@@ -88,6 +90,11 @@ class Disturbances:
             else:
                 sampled[name] = values
         return sampled
+
+    def draw(self, rng: np.random.Generator) -> dict[str, Any]:
+        """Return `sample(rng)`, under its old name."""
+        warn("Disturbances.draw", "Disturbances.sample")
+        return self.sample(rng)
 
     def idle(self, duration: float) -> list[str]:
         """Tell which kinds can never happen in an episode of `duration` seconds, and why."""

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from artde_gym.arrays import Array
+from artde_gym.deprecation import renamed_arguments
 from artde_gym.errors import OptionError
 from artde_gym.kit import ROBOTS, Capability
 from artde_gym.registry import Registry
@@ -58,6 +59,7 @@ A value is (n,), or (n, size); a word is its place among those allowed. The func
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
+@renamed_arguments({"words": "choices"})
 @dataclasses.dataclass(frozen=True)
 class Parameter:
     """One value of a disturbance.
@@ -87,6 +89,7 @@ class Parameter:
     with_other: tuple[str, Any] | None = None
 
 
+@renamed_arguments({"repeated": "multiple", "scalar": "shorthand"})
 @dataclasses.dataclass(frozen=True)
 class DisturbanceSpec:
     """A disturbance by name.
@@ -311,7 +314,7 @@ OWN: dict[str, DisturbanceSpec] = {
         DisturbanceSpec(
             "cable_delay",
             "The cable of a payload is measured late, as by a camera: vector, rate, and whether the load hangs.",
-            (Parameter("samples", "1", 0, 20, None, "by so many control periods", integer=True),),
+            (Parameter("steps", "1", 0, 20, None, "by so many control periods", integer=True),),
             shorthand="steps",
             requires="cable",
         ),

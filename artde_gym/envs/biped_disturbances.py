@@ -16,7 +16,7 @@ from artde_gym.sim.engine import World
 
 
 class EpisodeDisturbances:
-    """The disturbances of one episode: `start`, `begin_walk`, and then for each control period `begin_period` and its steps.
+    """The disturbances of one episode: `start`, `begin_walk`, then `begin_period` and the steps of each control period.
 
     Args:
         sampled: drawn disturbances.

@@ -47,7 +47,7 @@ class Sensors:
             self._noise = VehicleNoise(self._n, self._dtype)
         if self._noise is not None:
             self._noise.begin(vehicle, sampled)
-        self._delay[vehicle] = sampled.get("cable_delay", {}).get("samples", 0)
+        self._delay[vehicle] = sampled.get("cable_delay", {}).get("steps", 0)
         if self._late is None and self._delay[vehicle] and self._cable is not None:
             self._late = np.zeros((SLOTS, self._cable.stop - self._cable.start, self._n), self._dtype)
 

@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from artde_gym.deprecation import current_disturbances
 from artde_gym.errors import OptionError
 from artde_gym.evaluation import canonical
 from artde_gym.evaluation.environments import metrics_spec_of, single, vector, with_engine
@@ -50,6 +51,7 @@ def cells_of(
         )
     if disturbances is not None:
         disturbances = _mapping("disturbances", disturbances, "a mapping of kinds to their parameters")
+        disturbances = current_disturbances(disturbances, told=True)
     if names is None:
         own = {} if disturbances is None else {"disturbances": disturbances}
         env_id = env_id or DEFAULT_ENVIRONMENT

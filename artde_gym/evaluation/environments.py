@@ -6,18 +6,18 @@ import functools
 import inspect
 import json
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any
 
 import gymnasium as gym
 from gymnasium.envs.registration import load_env_creator
 from gymnasium.vector import AutoresetMode
 
+from artde_gym.deprecation import warn
 from artde_gym.errors import OptionError, suggest_names
 from artde_gym.kit import ROBOTS
 from artde_gym.metrics_spec import MetricsSpec
 from artde_gym.sim.factory import ENGINES, resolve_engine
 
-Backend = Literal["single", "batch"]
 """One environment for each episode in a physics engine, or many episodes in one vector environment."""
 
 PICTURES = ("width", "height", "render_mode")
@@ -31,7 +31,7 @@ def arguments_of(env_id: str, vectorized: bool = False) -> Mapping[str, inspect.
 
     Raises:
         gymnasium.error.Error: if there is no such environment.
-        OptionError: if it has no vector environment of its own and the backend needs one.
+        OptionError: if it has no vector environment of its own and `vectorized` needs one.
     """
     known = dict(inspect.signature(load_env_creator(_entry_point(env_id, vectorized))).parameters)
     known.pop("num_envs", None)
@@ -118,12 +118,15 @@ def drawing(env_id: str, kwargs: Mapping[str, Any], width: int) -> Any:
     Raises:
         OptionError: as of `single`, or where its engine cannot draw.
     """
-    given = {"width": width, "height": 3 * width // 4, **_checked(env_id, json.dumps(kwargs), "single")}
+    given = {"width": width, "height": 3 * width // 4, **_checked(env_id, json.dumps(kwargs), False)}
     return gym.make(env_id, disable_env_checker=True, render_mode="rgb_array", **given)
 
 
 def _class(env_id: str) -> Any:
     creator: Any = load_env_creator(_entry_point(env_id, False))
+    if not hasattr(creator, "metrics_spec") and hasattr(creator, "tracking"):
+        warn(f"attribute `tracking` of {creator.__name__}", "`metrics_spec`")
+        creator.metrics_spec = creator.tracking
     if not hasattr(creator, "metrics_spec"):
         raise OptionError("env_id", env_id, "an environment of artde_gym")
     return creator
@@ -144,5 +147,5 @@ def _entry_point(env_id: str, vectorized: bool) -> str:
         return str(spec.entry_point)
     if spec.vector_entry_point is None:
         able = [name for name in ours() if gym.spec(name).vector_entry_point]
-        raise OptionError("environment of the batch backend", env_id, ", ".join(able))
+        raise OptionError("environment to be vectorized", env_id, ", ".join(able))
     return str(spec.vector_entry_point)

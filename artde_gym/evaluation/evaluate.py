@@ -9,6 +9,7 @@ from typing import Any
 
 import pandas as pd
 
+from artde_gym.deprecation import takes_old_names
 from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.plan import Plan
 from artde_gym.evaluation.result import Result
@@ -19,6 +20,7 @@ from artde_gym.evaluation.tasks import Progress, Update, labels_of, run_task
 from artde_gym.evaluation.workers import run_jobs
 
 
+@takes_old_names
 @writes_folder
 def evaluate(
     controllers: Sequence[str | Policy] | Mapping[str, str | Policy],
@@ -52,10 +54,10 @@ def evaluate(
         disturbances: in place of the scenario's or the environment's own.
         env_kwargs: arguments of the environment, on top of the scenario's.
         gains: controller name -> gains in place of its preset's.
-        vectorized: "single" for one environment an episode; "batch" for a vector of them in chunks of `CHUNK` episodes,
-            which takes an environment with a vector form of its own. Both draw the same disturbances from a seed.
-        record_episodes: how many episodes of each controller and scenario leave signals in the folder; None for all of them, or
-            none in the batch backend.
+        vectorized: whether episodes run in vector environments, `CHUNK` of them at once, which takes an environment
+            with a vector form of its own. Both ways draw the same disturbances from a seed.
+        record_episodes: how many episodes of each controller and scenario leave signals in the folder; None for all of
+            them, or none if `vectorized`.
         record_hz: rate of stored signals; infinite for all of them.
         allow_mixed: continue a folder whose episodes other software ran (versions, source code, weights of controllers,
             code of the user's own); its provenance then says so.

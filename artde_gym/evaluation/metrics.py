@@ -39,7 +39,7 @@ from artde_gym.disturbances.kinds import NEVER
 from artde_gym.errors import OptionError
 from artde_gym.evaluation.registered import METRICS, Metric
 from artde_gym.layout import Layout
-from artde_gym.metrics_spec import Fields, MetricsSpec, TrackedSignal, Watched
+from artde_gym.metrics_spec import Fields, MetricsSpec, TrackedSignal, WatchedSignal
 
 GRAVITY = 9.81  # m/s^2
 BEFORE = 2.0  # s before a disturbance, whose largest error counts as recovered too
@@ -280,7 +280,7 @@ class _Mean:
 class _Watched:
     """What is watched in n episodes, and how pushes disturb it."""
 
-    def __init__(self, watched: Watched, events: Sequence[Mapping[str, Span]], period: float) -> None:
+    def __init__(self, watched: WatchedSignal, events: Sequence[Mapping[str, Span]], period: float) -> None:
         self._watched = watched
         self._mean, self._largest = _Mean(len(events)), np.full(len(events), np.nan)
         names = dict.fromkeys(name for one in events for name in one if name.startswith(PUSH))

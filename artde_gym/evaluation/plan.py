@@ -11,10 +11,9 @@ import functools
 import itertools
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from typing import Any, get_args
+from typing import Any
 
-from artde_gym.arguments import check_integer, check_number
-from artde_gym.errors import OptionError, suggest_names
+from artde_gym.arguments import check_bool, check_integer, check_number
 from artde_gym.evaluation.cells import Cell, cells_of, validate_cell
 from artde_gym.evaluation.gains import checked_gains, policy_for
 from artde_gym.evaluation.identity import Identity, behind, identity_of
@@ -42,7 +41,8 @@ class Plan:
         seed: from which those of the episodes are derived.
         workers: processes.
         vectorized: as for `evaluate`.
-        record_episodes: how many episodes of each controller and cell leave signals; None for what the backend is used to.
+        record_episodes: how many episodes of each controller and cell leave signals; None for all, or none if
+            `vectorized`.
         record_hz: rate of stored signals; infinite for all of them.
         allow_mixed: whether results of other software may be continued.
     """
@@ -87,8 +87,7 @@ class Plan:
         check_number(
             "record_hz", record_hz, SLOWEST, math.inf, f"a number >= {SLOWEST:g} (Hz), infinite for every sample"
         )
-        if vectorized not in get_args(Backend):
-            raise OptionError("vectorized", vectorized, suggest_names(vectorized, get_args(Backend)))
+        check_bool("vectorized", vectorized)
         if record_episodes is not None:
             check_integer("record_episodes", record_episodes, 0)
         named = named_controllers(controllers)

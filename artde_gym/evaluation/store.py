@@ -25,6 +25,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from artde_gym.arguments import check_file_name, wrap_read_errors
+from artde_gym.deprecation import current_column, current_configuration
 from artde_gym.errors import OptionError, StoreError
 from artde_gym.evaluation.lock import is_empty
 from artde_gym.evaluation.provenance import MIXED, continued
@@ -140,7 +141,7 @@ def read_episodes(folder: Path) -> tuple[str, pd.DataFrame]:
         whole = text[: text.rfind("\n") + 1]
         if not whole:
             return "", pd.DataFrame({name: [] for name in KEY})
-        frame = parse_table(whole, _WORDS)
+        frame = parse_table(whole, _WORDS).rename(columns=current_column)
         for name in KEY[:2]:
             for value in frame[name].unique():
                 check_file_name(name, value)
@@ -220,7 +221,8 @@ def claim(folder: Path, record: str, configuration: Mapping[str, Any]) -> Mappin
     if path.exists():
         with wrap_read_errors("output folder", folder, f"a folder whose {record} can be read", StoreError):
             content = json.loads(path.read_text(encoding="utf-8"))
-            found, before = dict(content["configuration"]), dict(content.get("provenance", {}))
+            found = current_configuration(content["configuration"])
+            before = dict(content.get("provenance", {}))
         if found != configuration:
             differs = [key for key in {*found, *configuration} if found.get(key) != configuration.get(key)]
             allowed = f"a new folder; this one holds other results (different: {', '.join(sorted(differs))})"

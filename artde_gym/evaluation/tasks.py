@@ -15,7 +15,7 @@ from artde_gym.evaluation.vector_rollout import run_vector
 from artde_gym.registration import ControllerSpec
 
 CHUNK = 2500
-"""Episodes at most that run at once in the batch backend: no result depends on it, and more would be little faster."""
+"""Most episodes that run at once in a vector environment: no result depends on it, and more would be little faster."""
 
 
 class Case(NamedTuple):

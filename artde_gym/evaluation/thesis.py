@@ -2,9 +2,25 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+from artde_gym.deprecation import warn
 from artde_gym.kit import ROBOTS, Reported
 
 _NOTHING = Reported("", {})
+
+
+_FIELDS = {"TABLES": "table", "VALUES": "values", "TIME_TO_FALL": "time_to_fall"}
+"""Old name of all tables -> field of `Reported`."""
+
+
+def __getattr__(name: str) -> Any:
+    """Answer to the names that the tables of all robots had once (PEP 562)."""
+    if name not in _FIELDS:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    warn(f"artde_gym.evaluation.thesis.{name}", "artde_gym.kit.ROBOTS[robot].reported")
+    known = {at: getattr(found, _FIELDS[name]) for kit in ROBOTS.values() for at, found in kit.reported.items()}
+    return {at: value for at, value in known.items() if value}
 
 
 def reported(scenario: str | None) -> Reported:

@@ -9,6 +9,7 @@ from typing import Any
 
 import pandas as pd
 
+from artde_gym.deprecation import current_configuration
 from artde_gym.errors import StoreError
 from artde_gym.evaluation.store import parse_table
 from artde_gym.palette import styles
@@ -28,7 +29,7 @@ def read_frontier(folder: Path) -> tuple[Frontier, dict[str, Any]]:
     """
     try:
         record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
-        wanted = record["configuration"]
+        wanted = record["configuration"] = current_configuration(record["configuration"])
         texts = [(folder / name).read_text(encoding="utf-8") for name in ("frontier.csv", "levels.csv")]
         table, levels = (parse_table(text, ("controller", "relation")) for text in texts)
         varied, survival = Varied(**wanted["axis"]), wanted["survival"]

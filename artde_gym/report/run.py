@@ -14,6 +14,7 @@ import pandas as pd
 
 from artde_gym.arguments import wrap_read_errors
 from artde_gym.arrays import Array
+from artde_gym.deprecation import current_configuration
 from artde_gym.errors import StoreError
 from artde_gym.evaluation.environments import metrics_spec_of
 from artde_gym.evaluation.metrics import Span, events_of
@@ -53,7 +54,7 @@ class Run:
         """
         with wrap_read_errors("results folder", folder, "one that `evaluate` or `frontier` wrote", StoreError):
             record = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-            wanted = record["configuration"]
+            wanted = record["configuration"] = current_configuration(record["configuration"])
             count = len(wanted["cells"]) * len(wanted["controllers"]) * wanted["episodes"]
         _, episodes = read_episodes(folder)
         complete = len(episodes) >= count

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
+from artde_gym.deprecation import current_configuration
 from artde_gym.errors import StoreError
 from artde_gym.evaluation.store import parse_table
 from artde_gym.palette import styles
@@ -51,9 +52,9 @@ def read_training(folder: Path) -> Trained:
     """
     try:
         record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
-        wanted = record["configuration"]
+        wanted = record["configuration"] = current_configuration(record["configuration"])
         tests = parse_table((folder / CURVE).read_text(encoding="utf-8"), ())
-        name = f"{wanted['recipe']['base']}+{wanted['algo']}"
+        name = f"{wanted['config']['base']}+{wanted['algo']}"
         tests = tests.astype(float)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise StoreError(
@@ -112,9 +113,8 @@ def parts(run: Trained) -> list[str]:
         for row in tests.itertuples(index=False, name=None)
     ]
     wanted = run.record["configuration"]
-    said = (
-        f"{run.name} in {wanted['env_id']}: {wanted['recipe']['action_mode']} channel, seed {wanted['seed']}, at most "
-    )
+    mode = wanted["config"]["action_mode"]
+    said = f"{run.name} in {wanted['env_id']}: action mode {mode}, seed {wanted['seed']}, at most "
     return [
         paragraph(f"{said}{_millions(wanted['steps'])} decisions."),
         figure("Held-out tests during the training; the vertical mark is the policy that was kept.", charts, shown),

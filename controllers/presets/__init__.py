@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from artde_gym.deprecation import warn
 from artde_gym.errors import UnknownNameError, suggest_names
 from artde_gym.registration import GainRange
 from controllers.drive import DRIVES, Preset
@@ -15,6 +16,14 @@ from controllers.laws.errors import GainError
 
 LOOPS = {"position": "p", "attitude": "q"}
 """Fields of a cascade's gains that hold the gains of a loop, and the suffix by which an override names one of those."""
+
+
+def __getattr__(name: str) -> Any:
+    """Answer to the name that all presets had once (PEP 562)."""
+    if name != "PRESETS":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    warn("controllers.presets.PRESETS", "controllers.drive.DRIVES[robot].presets")
+    return {robot: dict(drive.presets) for robot, drive in DRIVES.items()}
 
 
 def preset_gains(robot: str, law: str, preset: str | None, joints: int, overrides: dict[str, Any]) -> Any:

@@ -31,7 +31,7 @@ def table_of_a_command(folder: Path, case: dict[str, Any]) -> bytes:
     """In a process of its own, with other hashes and other numbers of threads."""
     command = [sys.executable, "-m", "artde_gym.cli", "evaluate", "--controllers", "tde,artde", "--episodes", "2"]
     command += ["--seed", "5", "--workers", "1", "--scenario", case["scenario"], "--out", str(folder)]
-    command += ["--env-kwargs", json.dumps(case["env_kwargs"]), "--vectorized", case.get("vectorized", "single")]
+    command += ["--env-kwargs", json.dumps(case["env_kwargs"]), *["--vectorized"] * case.get("vectorized", False)]
     changed = {"PYTHONHASHSEED": "4242", "OMP_NUM_THREADS": "3", "OPENBLAS_NUM_THREADS": "3"}
     subprocess.run(command, env={**os.environ, **changed}, check=True, capture_output=True)
     return (folder / "episodes.csv").read_bytes()

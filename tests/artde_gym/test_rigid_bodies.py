@@ -197,7 +197,7 @@ def test_an_off_centre_force_turns_the_body_by_its_moment() -> None:
     np.testing.assert_allclose(bodies.com_velocity[:, 0], 1e-4 * (force / BOTH.mass - [0, 0, G]), rtol=1e-6)
 
 
-@pytest.mark.parametrize(("before", "after"), [(BOTH, BARE), (BARE, BOTH)], ids=["drop", "attach_time"])
+@pytest.mark.parametrize(("before", "after"), [(BOTH, BARE), (BARE, BOTH)], ids=["drop", "attach"])
 def test_dropping_and_attaching_keep_momentum_and_the_motion_of_the_vehicle(
     before: MassProperties, after: MassProperties
 ) -> None:

@@ -142,7 +142,7 @@ def test_single_and_vector_tell_the_same(engine_name: EngineName) -> None:
 def test_a_delayed_cable_is_that_of_some_samples_ago() -> None:
     push = {"body": "payload", "magnitude": 2.0, "start": 0.0}
     prompt, late = (
-        vector(2, disturbances={**HELD, "push": push, **extra}) for extra in ({}, {"cable_delay": {"samples": 4}})
+        vector(2, disturbances={**HELD, "push": push, **extra}) for extra in ({}, {"cable_delay": {"steps": 4}})
     )
     seen: list[list[np.ndarray]] = [[prompt.reset(seed=0)[0]], [late.reset(seed=0)[0]]]
     for _ in range(20):
@@ -197,7 +197,7 @@ def test_what_is_watched_is_measured_alike_one_by_one_and_many_at_once() -> None
             env_kwargs={"duration": 1.8, **kwargs},
         ).episodes.iloc[0]
 
-    one, many = run("single", engine="mujoco"), run("batch")
+    one, many = run(False, engine="mujoco"), run(True)
     for column in (
         "rms_swing_deg",
         "max_swing_deg",

@@ -104,7 +104,7 @@ def test_draws_follow_their_distribution(distribution, holds):
         ("disturbances", {"wind": 1.0}),
         ("env_kwargs", {"duration": 3.0}),
         ("seed", 1),
-        ("vectorized", "batch"),
+        ("vectorized", True),
     ],
 )
 def test_whatever_decides_about_an_episode_decides_about_its_cell(name, value):

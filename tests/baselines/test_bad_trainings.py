@@ -88,7 +88,8 @@ def test_the_options_are_arguments_of_the_algorithm(algo: str) -> None:
     "field",
     [
         {"robot": ["q450"]}, {"base": 3}, {"gains": [1]}, {"gains": {1: 1}}, {"action_mode": "x"}, {"action_mode": 0},
-        {"action_mode": []}, {"decision_period": False}, {"decision_period": 1e9}, {"decision_period": "0.015"}, {"decision_period": None}, {"action_scale": float("nan")},
+        {"action_mode": []}, {"decision_period": False}, {"decision_period": 1e9}, {"decision_period": "0.015"},
+        {"decision_period": None}, {"action_scale": float("nan")},
         {"action_scale": -1.0}, {"action_scale": []}, {"gated": "no"}, {"gated": 1},
     ],
 )  # fmt: skip

@@ -81,8 +81,10 @@ def test_a_recipe_cannot_lead_elsewhere(recipe: dict[str, Any], tmp_path: Path) 
 
 FIELDS: list[tuple[str, Any]] = [
     ("version", True), ("version", 1.0), ("name", 3), ("name", "../../outside"), ("recipe", []),
-    ("recipe: decision_period", 1e9), ("recipe: decision_period", "0.015"), ("recipe: decision_period", False), ("recipe: decision_period", None),
-    ("recipe: action_scale", float("nan")), ("recipe: action_scale", -1), ("recipe: gated", "no"), ("recipe: action_mode", "x"),
+    ("recipe: decision_period", 1e9), ("recipe: decision_period", "0.015"),
+    ("recipe: decision_period", False), ("recipe: decision_period", None),
+    ("recipe: action_scale", float("nan")), ("recipe: action_scale", -1),
+    ("recipe: gated", "no"), ("recipe: action_mode", "x"),
     ("recipe: action_mode", 0), ("recipe: base", None), ("recipe: gains", []), ("recipe: robot", ["q450"]),
     ("recipe: unknown", 1), ("network", 3), ("network: sizes", [54]), ("network: sizes", []),
     ("network: sizes", [54, 0, 3]), ("network: sizes", [54.0, 64, 64, 3]), ("network: sizes", {"54": 3}),

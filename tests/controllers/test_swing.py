@@ -101,7 +101,7 @@ def test_gains_are_checked_and_tuned() -> None:
     assert controllers.make("tde+swing", env, preset="slung").gains.position.m_bar == 1.6
     for name in SLUNG:
         for gain in tuning_space(name, env).values():
-            assert gain.low <= gain.start <= gain.high
+            assert gain.low <= gain.initial <= gain.high
 
 
 def swings(name: str, mass: float, cable: float, **gains: Any) -> tuple[np.ndarray, np.ndarray]:

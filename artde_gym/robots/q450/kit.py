@@ -102,7 +102,7 @@ _SLING_FRONTIER = dataclasses.replace(
         "payload.mass": Range(0.05, 1.5, 0.05),
         "payload.cable": Range(0.1, 1.3, 0.05),
         "push.magnitude": Range(0.0, 20.0, 0.5),
-        "cable_delay.samples": Range(0.0, 20.0, 1.0),
+        "cable_delay.steps": Range(0.0, 20.0, 1.0),
     },
 )
 
@@ -121,7 +121,7 @@ KIT = RobotKit(
         Environment(
             _SLING,
             "artde_gym.envs.quadrotor_sling:QuadSlingPayloadEnv",
-            "artde_gym.envs.quadrotor_sling_batch:QuadSlingPayloadVectorEnv",
+            "artde_gym.envs.quadrotor_sling_vector:QuadSlingPayloadVectorEnv",
             main=("Q-sling", "Q-sling-calm", "Q-sling-gale"),
             frontier=_SLING_FRONTIER,
         ),

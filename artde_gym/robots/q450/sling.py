@@ -15,7 +15,7 @@ import numpy as np
 
 from artde_gym.arrays import Array
 from artde_gym.layout import Field, Layout
-from artde_gym.metrics_spec import Fields, Watched
+from artde_gym.metrics_spec import Fields, WatchedSignal
 from artde_gym.robots.q450 import task
 from artde_gym.robots.q450.infinity import LIFT, LIFTED_FAN
 from artde_gym.sim.engine import PAYLOAD_RADIUS
@@ -51,9 +51,9 @@ METRICS_SPEC = dataclasses.replace(
     task.METRICS_SPEC,
     told=TOLD,
     watched=(
-        Watched("swing", "deg", 180.0 / math.pi, _while_hanging("swing"), math.radians(3.0)),
-        Watched("load_error", "m", 1.0, _while_hanging("load_error"), 0.05),
-        Watched("cable_impulse", "ns", 1.0, _while_hanging("cable_impulse"), math.inf),
+        WatchedSignal("swing", "deg", 180.0 / math.pi, _while_hanging("swing"), math.radians(3.0)),
+        WatchedSignal("load_error", "m", 1.0, _while_hanging("load_error"), 0.05),
+        WatchedSignal("cable_impulse", "ns", 1.0, _while_hanging("cable_impulse"), math.inf),
     ),
 )
 """As of the other environment, and the load: 3 degrees of swing, or 5 cm, count as settled.

@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from artde_gym.deprecation import current_path, warn
 from artde_gym.disturbances import DISTURBANCES
 from artde_gym.disturbances.kinds import parameters_of
 from artde_gym.errors import OptionError, UnknownNameError, suggest_names
@@ -91,6 +92,9 @@ def axis(
         UnknownNameError: if there is no number at this path.
         OptionError: for a range that is missing, empty, off the grid of whole numbers, or not allowed.
     """
+    if current_path(path) != path:
+        warn(f"path {path!r}", repr(current_path(path)))
+        path = current_path(path)
     kind, name, unit = _find(env_id, path)
     standard = standard_for(env_id)
     default = None if standard is None else standard.ranges.get(path)

@@ -29,6 +29,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from artde_gym.deprecation import takes_old_names
 from artde_gym.evaluation import statistics
 from artde_gym.evaluation.cells import CUSTOM
 from artde_gym.evaluation.evaluate import run_plan
@@ -47,6 +48,7 @@ from artde_gym.studies.frontier.table import LEVEL_COLUMNS, frontier_of
 RECORD_HZ = 10.0  # a frontier has hundreds of episodes; their traces are for a look at a fall, not for metrics
 
 
+@takes_old_names
 @writes_folder
 def frontier(
     controllers: Sequence[str | Policy] | Mapping[str, str | Policy],
@@ -74,8 +76,8 @@ def frontier(
     Args:
         controllers: as for `evaluate`.
         env_id: any registered environment of this project.
-        vary: "kind.parameter" of `artde_gym.disturbances.DISTURBANCES`, in all entries of a kind that takes several; or an
-            argument of the environment that is a number.
+        vary: "kind.parameter" of `artde_gym.disturbances.DISTURBANCES`, in all entries of a kind that takes several;
+            or an argument of the environment that is a number.
         low: smallest value, in the parameter's unit (a control period in s); there are defaults for usual paths.
         high: largest value.
         tolerance: width of the bracket to be found.

@@ -30,10 +30,12 @@ import sys
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
+from artde_gym.arguments import check_bool
+from artde_gym.deprecation import current_column, current_disturbances, warn
 from artde_gym.disturbances import DISTURBANCES
 from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from artde_gym.evaluation import canonical
@@ -139,18 +141,22 @@ def design(given: Mapping[str, Any]) -> Design:
             environments and controllers themselves refuse is not asked here.
     """
     _check_plain("sweep", given)
+    given = _current(given)
     for key in given:
         if key not in KEYS:
             raise OptionError("key of the sweep", key, suggest_names(key, KEYS))
-    episodes, vectorized = given.get("episodes", 1), given.get("vectorized", "single")
+    episodes, vectorized = given.get("episodes", 1), given.get("vectorized", False)
     if not (_is_whole(episodes) and 1 <= episodes <= MOST_EPISODES):
         raise OptionError("episodes", episodes, f"a whole number from 1 to {MOST_EPISODES}")
-    if vectorized not in get_args(Backend):
-        raise OptionError("vectorized", vectorized, suggest_names(vectorized, get_args(Backend)))
+    check_bool("vectorized", vectorized)
     fixed = {**SETTINGS, **{name: value for name, value in given.items() if name in SETTINGS}}
     for name, value in fixed.items():
         _check_setting(name, value)
-    grid, draws = _grid(given.get("grid", {})), _draws(given.get("sample"), fixed["seed"])
+    grid = {_current_path(path): values for path, values in _grid(given.get("grid", {})).items()}
+    draws = _draws(
+        given.get("sample"), fixed["seed"]
+    )  # by the paths as they are written, so that old files draw the same
+    draws = [{_current_path(path): value for path, value in draw.items()} for draw in draws]
     for path, values in grid.items():
         if path in draws[0]:
             raise OptionError("path", path, "either in the grid or in the sample")
@@ -171,6 +177,29 @@ def design(given: Mapping[str, Any]) -> Design:
     if len(points) * episodes > MOST_EPISODES:
         raise OptionError("sweep", f"{len(points) * episodes} episodes", f"at most {MOST_EPISODES}")
     return Design(tuple(points.values()), episodes, vectorized, json.dumps(given))
+
+
+def _current(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the content of a sweep's file under the names of now."""
+    found = dict(given)
+    if "backend" in found:
+        warn("key 'backend' of a sweep", "'vectorized: true'")
+        known = {"single": False, "batch": True}
+        backend = found.pop("backend")
+        if not (isinstance(backend, str) and backend in known):
+            raise OptionError("backend", backend, "'single', 'batch'; or rather vectorized: true")
+        found["vectorized"] = known[backend]
+    if isinstance(found.get("disturbances"), Mapping):
+        found["disturbances"] = current_disturbances(found["disturbances"], told=True)
+    return found
+
+
+def _current_path(path: str) -> str:
+    """Return a path under the names of now."""
+    now = current_column(path)
+    if now != path:
+        warn(f"path {path!r} of a sweep", repr(now))
+    return now
 
 
 def _grid(given: Any) -> dict[str, list[Any]]:
@@ -283,7 +312,14 @@ def _point(settings: Mapping[str, Any], vectorized: bool, names: set[Any]) -> Sw
     (cell,) = cells_of(*given, vectorized)
     gains, seed, spec = settings["gains"].get(controller, {}), settings["seed"], known[controller]
     means = cell._replace(kwargs=canonical.arguments(cell.kwargs, cell.env_id, vectorized))
-    decides = [*means, controller, identity_of(spec).value, canonical.numbers(gains), seed, vectorized]
+    decides = [
+        *means,
+        controller,
+        identity_of(spec).value,
+        canonical.numbers(gains),
+        seed,
+        "batch" if vectorized else "single",
+    ]
     digest = hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
     return SweepCell(cell, controller, spec, gains, seed, digest[:16])
 

@@ -111,7 +111,8 @@ def sweep(
 
 def _check_executor(executor: Any, address: Any) -> None:
     if executor not in get_args(Executor):
-        allowed = f"{suggest_names(executor, get_args(Executor))}; a physics engine is an argument of environments (env_kwargs)"
+        known = suggest_names(executor, get_args(Executor))
+        allowed = f"{known}; a physics engine is an argument of environments (env_kwargs)"
         raise OptionError("executor", executor, allowed)
     if address is not None and executor != "ray":
         raise OptionError("address", address, "none without executor 'ray'")

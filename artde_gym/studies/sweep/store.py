@@ -24,6 +24,7 @@ from typing import Any
 
 import pandas as pd
 
+from artde_gym.deprecation import current_column
 from artde_gym.errors import StoreError
 from artde_gym.evaluation.provenance import continued, provenance
 from artde_gym.evaluation.store import claim, write_atomically
@@ -247,7 +248,8 @@ def _unreadable(folder: Path) -> StoreError:
 
 def _read(path: Path) -> Any:
     try:
-        return parquet.decode(path.read_bytes())
+        part = parquet.decode(path.read_bytes())
+        return part.rename_columns([current_column(name) for name in part.column_names])
     except (OSError, ValueError) as error:
         allowed = f"as it was written ({error}); the sweep's command sets it aside and runs its episodes again"
         raise StoreError("part of a sweep", str(path), allowed) from error

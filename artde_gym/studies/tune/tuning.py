@@ -28,6 +28,7 @@ import numpy as np
 import pandas as pd
 
 from artde_gym.arguments import check_integer
+from artde_gym.deprecation import takes_old_names
 from artde_gym.errors import OptionError
 from artde_gym.evaluation import canonical
 from artde_gym.evaluation.environments import metrics_spec_of, single, with_engine
@@ -72,6 +73,7 @@ class Tuning:
     complete: bool = True
 
 
+@takes_old_names
 @writes_folder
 def tune(
     controllers: Sequence[str],
