@@ -46,7 +46,7 @@ class QuadSlingPayloadEnv(QuadInfinityPayloadEnv):
     """
 
     observation_layout = sling.OBSERVATION
-    tracking = sling.METRICS_SPEC
+    metrics_spec = sling.METRICS_SPEC
     fall_reasons: ClassVar[Sequence[str]] = sling.FALL_REASONS
     reward_scales = sling.REWARD_SCALES
     default_disturbances = sling.DEFAULT_DISTURBANCES

@@ -47,7 +47,7 @@ class QuadSlingPayloadVectorEnv(QuadInfinityPayloadVectorEnv):
     """
 
     observation_layout = sling.OBSERVATION
-    tracking = sling.METRICS_SPEC
+    metrics_spec = sling.METRICS_SPEC
     fall_reasons: ClassVar[Sequence[str]] = sling.FALL_REASONS
     reward_scales = sling.REWARD_SCALES
     default_disturbances = sling.DEFAULT_DISTURBANCES

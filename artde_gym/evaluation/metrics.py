@@ -286,7 +286,8 @@ class _Watched:
         names = dict.fromkeys(name for one in events for name in one if name.startswith(PUSH))
         never = (np.inf, np.inf)
         self._events = {
-            name: _Event([one.get(name, never) for one in events], watched.band, period, widens=False) for name in names
+            name: _Event([one.get(name, never) for one in events], watched.settling_band, period, widens=False)
+            for name in names
         }
 
     def add(self, fields: Fields, start: int, live: Mask | None) -> None:
@@ -306,7 +307,7 @@ class _Watched:
         }
         for event, found in self._events.items():
             columns[f"peak_{name}_{unit}_{event}"] = scale * found.peak
-            if np.isfinite(self._watched.band):
+            if np.isfinite(self._watched.settling_band):
                 columns[f"recovery_time_s_{event}_{name}"] = found.recovery_time(count, fell)
         return columns
 

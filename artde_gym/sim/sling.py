@@ -109,7 +109,7 @@ class Sling:
         if site == PAYLOAD:
             self._push_payload(force)
             return
-        self._engine.push(site, force)
+        self._engine.apply_force(site, force)
         if self._hanging is not None and site in self._sites:
             self._add(force, self._moment(self._sites[site], force))
 

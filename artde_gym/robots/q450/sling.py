@@ -49,7 +49,7 @@ def _while_hanging(name: str) -> Callable[[Fields], Array]:
 
 METRICS_SPEC = dataclasses.replace(
     task.METRICS_SPEC,
-    told=TOLD,
+    recorded_info=TOLD,
     watched=(
         WatchedSignal("swing", "deg", 180.0 / math.pi, _while_hanging("swing"), math.radians(3.0)),
         WatchedSignal("load_error", "m", 1.0, _while_hanging("load_error"), 0.05),
