@@ -21,13 +21,17 @@ from typing import Any, Literal, NamedTuple
 from artde_gym.registry import Registry
 from artde_gym.scenarios import Scenario
 
+PAYLOAD = "payload"
+"""The site at which a payload is pushed, of robots with the capability "cable"."""
+
 Capability = Literal[
-    "actuators", "armature", "contact", "effects", "encoders", "feet", "flight", "joints", "legs", "mass", "payload",
-    "rotors", "sensors", "sites", "torque_limit",
+    "actuators", "armature", "cable", "contact", "effects", "encoders", "feet", "flight", "joints", "legs", "mass",
+    "payload", "rotors", "sensors", "sites", "torque_limit",
 ]  # fmt: skip
 """Properties of a robot and its environments that kinds of disturbances require.
 
-"effects": the environments apply registered kinds through `artde_gym.disturbances.effects.Effects`.
+"effects": the environments apply registered kinds through `artde_gym.disturbances.effects.Effects`. "cable": a payload
+may hang on one.
 """
 Harder = Literal["larger", "smaller"]
 
@@ -35,13 +39,15 @@ Harder = Literal["larger", "smaller"]
 class Environment(NamedTuple):
     """An environment to be registered with Gymnasium; entry points are "module:class".
 
-    `main` names the scenarios that `artde-gym evaluate` runs in it by default.
+    `main` names the scenarios that `artde-gym evaluate` runs in it by default; `frontier` is its standard test of a
+    frontier, None for the robot's.
     """
 
     env_id: str
     entry_point: str
     vector_entry_point: str | None = None
     main: tuple[str, ...] = ()
+    frontier: FrontierTest | None = None
 
 
 class Range(NamedTuple):
@@ -138,7 +144,7 @@ class RobotKit:
         scenarios: scenarios of its evaluation.
         reproduced: names of the scenarios that `reproduce` runs, and of the controllers in them.
         reported: published results of its scenarios, by their published name (`Scenario.thesis`).
-        frontier: its standard test; None if it has none.
+        frontier: its standard test, where an environment has none of its own; None if it has none.
         motion: motion shown by pictures in a report.
         push: pushes of live play; None: 10 N at the first site.
         report: module with `reference(kwargs)` and `figures(episode)`, see `artde_gym.report.robot`; None: only the
@@ -168,7 +174,8 @@ class RobotKit:
     @property
     def sites(self) -> tuple[str, ...]:
         """Names of the sites that can be pushed."""
-        return tuple(name for name, _, _ in self.model().sites)
+        own = tuple(name for name, _, _ in self.model().sites)
+        return (*own, PAYLOAD) if "cable" in self.capabilities else own
 
 
 ROBOTS: Registry[RobotKit] = Registry("robot", "artde_gym.robots", lambda kit: {kit.name: kit})

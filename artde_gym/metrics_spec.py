@@ -62,6 +62,25 @@ class EffortSignal:
     }
 )
 @dataclasses.dataclass(frozen=True)
+class WatchedSignal:
+    """A size that has no reference of its own, such as a swing.
+
+    Attributes:
+        name: as columns spell it.
+        unit: in which it is reported, as columns spell it.
+        scale: how many of it make one SI unit.
+        size: observations and told entries of `info` -> values (...), in SI; NaN where there is none.
+        settling_band: value that counts as settled after a push, in SI; infinite where settling means nothing.
+    """
+
+    name: str
+    unit: str
+    scale: float
+    size: Callable[[Fields], Array]
+    settling_band: float
+
+
+@dataclasses.dataclass(frozen=True)
 class MetricsSpec:
     """Everything that metrics need to know about an environment.
 
@@ -77,7 +96,8 @@ class MetricsSpec:
             without reaching it.
         tde_errors: column -> diagnostic of a policy that is an error of time-delay estimation.
         diagnostic_means: column -> scalar diagnostic of a policy whose mean is reported.
-        recorded_info: entries of `info` that are recorded in an episode's traces too.
+        recorded_info: numeric entries of `info` that are recorded in an episode's traces too.
+        watched: further signals, from observations and recorded entries.
         speed: observations -> speed of travel (...), m/s; None if a cost of transport makes no sense.
     """
 
@@ -91,6 +111,7 @@ class MetricsSpec:
     tde_errors: Mapping[str, str]
     diagnostic_means: Mapping[str, str]
     recorded_info: tuple[str, ...] = ()
+    watched: tuple[WatchedSignal, ...] = ()
     speed: Callable[[Fields], Array] | None = None
 
     @property

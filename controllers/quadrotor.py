@@ -24,10 +24,13 @@ class QuadrotorPolicy(Policy):
         name: of the law.
         interface: a quadrotor's environment.
         gains: of the cascade.
+        laws: of the position and the attitude; None for those that belong to the name.
     """
 
-    def __init__(self, name: str, interface: ControlInterface, gains: CascadeGains) -> None:
-        (self._position, position), (self._attitude, attitude) = _LOOPS[name]
+    def __init__(
+        self, name: str, interface: ControlInterface, gains: CascadeGains, *, laws: tuple[Entry, Entry] | None = None
+    ) -> None:
+        (self._position, position), (self._attitude, attitude) = LOOP_LAWS[name] if laws is None else laws
         period = interface.control_period
         own = {"position": position(gains.position, period), "attitude": attitude(gains.attitude, period)}
         super().__init__(name, interface, dataclasses.replace(gains, **own))
@@ -105,7 +108,7 @@ def _roll_pitch_yaw(axes: Axes) -> Array:
     return joined((np.arctan2(y[2], z[2]), pitch, np.arctan2(x[1], x[0])))
 
 
-_LOOPS: dict[str, tuple[Entry, Entry]] = {
+LOOP_LAWS: dict[str, tuple[Entry, Entry]] = {
     **{name: (LAWS[name], LAWS[name]) for name in ("tde", "atde", "artde", "tde+c", "tde+kd", "asmc", "indi")},
     "pid": (LAWS["positional-pid"], LAWS["positional-pid"]),
     "geometric": (LAWS["positional-pid"], LAWS["rigid-attitude"]),

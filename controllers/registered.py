@@ -23,6 +23,19 @@ CONTROLLERS = (
     _law("asmc", "quadrotor: adaptive sliding mode (this project's own law)", law="asmc"),
     _law("indi", "quadrotor: incremental nonlinear dynamic inversion", law="indi"),
     _law("geometric", "quadrotor: geometric control on SE(3), with an integral", law="geometric"),
+    *(
+        _law(
+            f"{law}+swing",
+            f"quadrotor with a cable: {law.upper()} + a term that damps the load's swing",
+            law=f"{law}+swing",
+        )
+        for law in ("tde", "atde", "artde")
+    ),
+    _law(
+        "geometric-load",
+        "quadrotor with a cable: geometric control of the load, whose mass it knows",
+        law="geometric-load",
+    ),
     ControllerSpec(
         "computed-torque",
         "controllers.model_based:make_computed_torque",

@@ -28,6 +28,7 @@ _SHORT: dict[str, dict[str, Any]] = {
     "BipedWalk-Payload-v0": {"duration": 0.1, "control_period": 0.004, "actuator_inertia": "lumped"},
     "BipedPush-v0": {"duration": 0.1, "control_period": 0.004, "actuator_inertia": "lumped"},
     "QuadInfinity-Payload-v0": {"duration": 0.3},
+    "QuadSling-Payload-v0": {"duration": 0.3},
 }
 
 Progress = Callable[[str], None]

@@ -123,6 +123,7 @@ def disturbances() -> Entries:
                         robot: _plain(value) for robot, value in other_defaults(kind, parameter).items()
                     },
                     "text": parameter.text,
+                    **({} if parameter.requires is None else {"requires": parameter.requires}),
                 }
                 for parameter in kind.parameters
             ],
@@ -134,10 +135,11 @@ def disturbances() -> Entries:
 def frontiers() -> Entries:
     """Return every path with a default range in `frontier`."""
     return [
-        {"name": path, "robot": robot, **values._asdict()}
+        {"name": path, "robot": robot, "environment": entry.env_id, **values._asdict()}
         for robot, kit in ROBOTS.items()
-        if kit.frontier is not None
-        for path, values in kit.frontier.ranges.items()
+        for entry in kit.environments
+        if (test := entry.frontier or kit.frontier) is not None
+        for path, values in test.ranges.items()
     ]
 
 

@@ -36,7 +36,8 @@ from artde_gym.report.frontier_page import survival_chart
 from artde_gym.studies import frontier as run_frontier
 from artde_gym.studies.frontier.console import print_frontier
 
-VARIED = dict.fromkeys(path for kit in ROBOTS.values() if kit.frontier for path in kit.frontier.ranges)
+_TESTS = [entry.frontier or kit.frontier for kit in ROBOTS.values() for entry in kit.environments]
+VARIED = dict.fromkeys(path for test in _TESTS if test for path in test.ranges)
 
 
 def frontier(

@@ -154,10 +154,10 @@ def _disturbances_in_full(entries: Entries, console: Console) -> None:
 
 
 def _frontiers(entries: Entries, console: Console) -> None:
-    table = _table("Frontiers", "varied", "robot", "from", "to", "step", "harder")
+    table = _table("Frontiers", "varied", "environment", "from", "to", "step", "harder")
     for entry in entries:
         numbers = (f"{entry[key]:g}" for key in ("low", "high", "tolerance"))
-        table.add_row(entry["name"], entry["robot"], *numbers, entry["harder"])
+        table.add_row(entry["name"], entry["environment"], *numbers, entry["harder"])
     console.print(table)
 
 

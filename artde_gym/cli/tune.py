@@ -37,6 +37,9 @@ def tune(
     trials: Annotated[int, typer.Option(help="Sets of gains per controller, including its preset.")] = 50,
     episodes: Annotated[int, typer.Option(help="Seeded training episodes per trial.")] = 4,
     held_out: Annotated[int, typer.Option(help="Unseen seeded episodes of the final comparison.")] = 20,
+    metric: Annotated[
+        str | None, typer.Option(help="Column of episodes.csv to minimize. Default: the environment's first error.")
+    ] = None,
     seed: Seed = 0,
     workers: Workers = None,
     out: Out = None,
@@ -58,6 +61,7 @@ def tune(
             trials=trials,
             episodes=episodes,
             held_out=held_out,
+            metric=metric,
             seed=seed,
             workers=processes(workers),
             out=folder_of(out),

@@ -21,6 +21,7 @@ import numpy as np
 from artde_gym.deprecation import current_disturbances, warn
 from artde_gym.disturbances.kinds import ALL, DISTURBANCES, NEVER, DisturbanceSpec, Parameter, allowed, in_order
 from artde_gym.errors import DisturbanceError, suggest_names
+from artde_gym.kit import PAYLOAD
 
 DISTRIBUTIONS = ("uniform", "normal", "choice")
 NORMAL_DRAWS = 1000  # tries to hit the allowed range before the mean, which is in it, is used
@@ -72,6 +73,7 @@ class Disturbances:
                 for path, entry in _entries(kind, named[name]):
                     parsed = _parse_entry(kind, entry, path, {"site": sites, "joint": (*joints, ALL)}, robot)
                     entries += [(name, one) for one in _each_joint(parsed, joints)]
+        _require_load(entries)
         return cls(tuple(entries))
 
     def sample(self, rng: np.random.Generator) -> dict[str, Any]:
@@ -112,6 +114,14 @@ class Disturbances:
         return json.dumps(grouped)
 
 
+def _require_load(entries: Sequence[tuple[str, Mapping[str, Any]]]) -> None:
+    """See that there is a payload where one is pushed."""
+    kinds = {name for name, _ in entries}
+    for name, entry in entries:
+        if name == "push" and entry["body"] == PAYLOAD and "payload" not in kinds:
+            raise DisturbanceError("push.body", PAYLOAD, "a site of the robot itself: there is no payload")
+
+
 def _idle(entry: Mapping[str, Any], duration: float) -> str:
     """Return why an entry can never happen; "" if it can."""
     begin = min(_range(entry.get("start", entry.get("attach_time", 0.0))))
@@ -148,7 +158,7 @@ def _each_joint(entry: dict[str, Any], joints: Collection[str]) -> list[dict[str
 def _parse_entry(
     kind: DisturbanceSpec, given: Any, path: str, words: Mapping[str, Collection[str]], robot: str | None
 ) -> dict[str, Any]:
-    names = {parameter.name: parameter for parameter in kind.parameters}
+    names = {parameter.name: parameter for parameter in kind.parameters_for(robot)}
     if kind.shorthand is not None and (_is_number(given) or _is_distribution(given)):
         given = {kind.shorthand: given}
     if not isinstance(given, Mapping):
@@ -166,7 +176,7 @@ def _parse_entry(
         field = f"{path}.{name}"
         if name not in given and parameter.default is None:
             raise DisturbanceError(field, None, f"{allowed(parameter)} (it has no default)")
-        value = given.get(name, kind.default_of(parameter, robot))
+        value = given.get(name, kind.default_of(parameter, robot, given))
         entry[name] = _word(value, parameter, field, words) if parameter.size == 0 else _check(value, parameter, field)
     return entry
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
+from numbers import Real
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from artde_gym.arrays import Array
@@ -55,6 +57,9 @@ randomness.
 """
 
 
+NOTHING: Mapping[str, Any] = MappingProxyType({})
+
+
 @renamed_arguments({"words": "choices"})
 @dataclasses.dataclass(frozen=True)
 class Parameter:
@@ -68,6 +73,8 @@ class Parameter:
         integer: True if the value is a whole number.
         choices: allowed words, or "site" or "joint" for the robot's names; rotors count as joints.
         smaller_is_harder: True if smaller values disturb a robot more.
+        requires: capability that a robot needs for this parameter; None if the kind's own is enough.
+        with_other: another parameter, and the default where that one is given and not zero.
     """
 
     name: str
@@ -81,6 +88,8 @@ class Parameter:
     integer: bool = False
     choices: tuple[str, ...] | str = ()
     smaller_is_harder: bool = False
+    requires: Capability | None = None
+    with_other: tuple[str, Any] | None = None
 
 
 @renamed_arguments({"repeated": "multiple", "scalar": "shorthand"})
@@ -105,8 +114,20 @@ class DisturbanceSpec:
     one_of: tuple[str, ...] = ()
     effect: Effect | None = None
 
-    def default_of(self, parameter: Parameter, robot: str | None) -> Any:
-        """Return a parameter's default for a robot, or for no particular robot (None)."""
+    def parameters_for(self, robot: str | None) -> tuple[Parameter, ...]:
+        """Return the parameters that a robot supports, or all for no particular robot (None)."""
+        if robot is None:
+            return self.parameters
+        able = ROBOTS[robot].capabilities
+        return tuple(one for one in self.parameters if one.requires is None or one.requires in able)
+
+    def default_of(self, parameter: Parameter, robot: str | None, given: Mapping[str, Any] = NOTHING) -> Any:
+        """Return a parameter's default for a robot, or for no particular robot (None), beside `given` parameters."""
+        if parameter.with_other is not None:
+            other, default = parameter.with_other
+            value = given.get(other, 0.0)
+            if not (isinstance(value, Real) and value == 0):
+                return default
         own = {} if robot is None else ROBOTS[robot].defaults
         return own.get(f"{self.name}.{parameter.name}", parameter.default)
 
@@ -118,6 +139,7 @@ class DisturbanceSpec:
 
 ALL = "all"
 NEVER = 1e9  # s
+HOOK = (0.0, 0.0, -0.05)  # m, where a cable begins
 SHAPES = ("half_sine", "double_hump")
 TRIGGERS = ("contact", "plan")
 
@@ -135,7 +157,8 @@ OWN: dict[str, DisturbanceSpec] = {
     for kind in (
         DisturbanceSpec(
             "payload",
-            "A ball fixed to the base.",
+            "A ball fixed to the base, or hanging under it on a cable, which neither stretches nor weighs anything and "
+            "goes slack; see `artde_gym.sim.cable`. While it is there, the site `payload` is where it can be pushed.",
             (
                 Parameter("mass", "kg", 1e-3, 5.0, None, "mass of the ball"),
                 Parameter(
@@ -144,11 +167,13 @@ OWN: dict[str, DisturbanceSpec] = {
                     -0.5,
                     0.5,
                     (0.0, 0.0, 0.16),
-                    "its center in the base frame",
+                    "its center in the base frame; with a cable, the hook's place",
                     size=3,
+                    with_other=("cable", HOOK),
                 ),
                 _time("attach_time", 0.0, "attachment; at 0 the episode starts in equilibrium with the payload"),
                 _time("detach_time", NEVER, "release; if not after `attach_time`, the payload never appears"),
+                Parameter("cable", "m", 0.0, 2.0, 0.0, "length of the cable; 0: rigidly attached", requires="cable"),
             ),
             shorthand="mass",
             requires="payload",
@@ -290,6 +315,13 @@ OWN: dict[str, DisturbanceSpec] = {
             (Parameter("steps", "1", 0, 100, None, "number of control periods", integer=True),),
             shorthand="steps",
             requires="actuators",
+        ),
+        DisturbanceSpec(
+            "cable_delay",
+            "The cable of a payload is measured late, as by a camera: vector, rate, and whether the load hangs.",
+            (Parameter("steps", "1", 0, 20, None, "by so many control periods", integer=True),),
+            shorthand="steps",
+            requires="cable",
         ),
         DisturbanceSpec(
             "motor_lag",
@@ -458,12 +490,20 @@ def page() -> str:
             default = f"`{parameter.default}`"
             if parameter.default is None:
                 default = "one of these" if parameter.name in kind.one_of else "required"
+            if parameter.with_other is not None:
+                default += f"; with `{parameter.with_other[0]}`: `{parameter.with_other[1]}`"
             default += "".join(f"; {robot}: `{value}`" for robot, value in other_defaults(kind, parameter).items())
-            text = parameter.text + (" (set by a bare number)" if parameter.name == kind.shorthand else "")
+            text = parameter.text + ("" if parameter.requires is None else f" ({_known_by(kind, parameter)} only)")
+            text += " (set by a bare number)" if parameter.name == kind.shorthand else ""
             row = (f"`{parameter.name}`", parameter.unit, allowed(parameter), default, text)
             lines.append("| " + " | ".join(row) + " |")
         lines.append("")
     return INTRODUCTION + "\n".join(lines)
+
+
+def _known_by(kind: DisturbanceSpec, parameter: Parameter) -> str:
+    """Name the robots that know a parameter."""
+    return ", ".join(robot for robot in ROBOTS if kind.honored_by(robot) and parameter in kind.parameters_for(robot))
 
 
 def parameters_of(kind: str, given: Any) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, cast
 
 import numpy as np
 
@@ -19,6 +19,12 @@ class Loaded(Protocol):
     def apply_force(self, site: str, force: Vector) -> None: ...
     def attach_payload(self, mass: float, position: Vector) -> None: ...
     def release_payload(self) -> None: ...
+
+
+class Slinging(Loaded, Protocol):
+    """World of a schedule with a payload on a cable."""
+
+    def hang_payload(self, mass: float, hook: Vector, length: float) -> None: ...
 
 
 class Push(NamedTuple):
@@ -101,7 +107,10 @@ class Schedule:
 
     def _attach(self, world: Loaded) -> None:
         x, y, z = self._payload["position"]
-        world.attach_payload(self._payload["mass"], (x, y, z))
+        if length := self._payload.get("cable", 0.0):
+            cast(Slinging, world).hang_payload(self._payload["mass"], (x, y, z), length)
+        else:
+            world.attach_payload(self._payload["mass"], (x, y, z))
 
     def _announce(self, push: Push) -> None:
         self._add(push.first, PUSH_BEGINS)

@@ -12,6 +12,8 @@ from artde_gym.arrays import Array
 from artde_gym.disturbances.noise import Integers, normal_noise
 from artde_gym.sim.rigid_bodies import rotate_frames
 
+BEYOND = np.uint64(2**40)  # samples, further than any flight goes: from there on the stream is the cable's
+
 
 class VehicleNoise:
     """White Gaussian noise for `n` vehicles, each with its own standard deviations."""
@@ -34,6 +36,15 @@ class VehicleNoise:
         velocity += of_velocity * noise[3:6]
         np.copyto(rot, rotate_frames(rot, of_attitude * noise[6:9]), where=of_attitude > 0)
         rates += of_rates * noise[9:12]
+
+    def measure_cable(
+        self, cable: Array, rate: Array, held: NDArray[np.bool_], sample: NDArray[np.int64], keys: Integers
+    ) -> None:
+        """Add noise of positions and velocities to cables and their rates (3, n) in place, where they are held."""
+        noise = normal_noise(keys, sample.astype(np.uint64) + BEYOND, 6).astype(cable.dtype)
+        of_position, of_velocity, _, _ = self._deviations
+        cable += np.where(held, of_position * noise[:3], 0.0)
+        rate += np.where(held, of_velocity * noise[3:], 0.0)
 
 
 _NAMES = ("position", "velocity", "tilt", "angular_velocity")

@@ -110,9 +110,13 @@ class Wind:
         self._read = 0  # grid points
         self._states: Vector4[float] = (0.0, 0.0, 0.0, 0.0)
 
-    def next(self, position: Vector3[float]) -> Vector3[float]:
+    def at(self, position: Vector3[float]) -> Vector3[float]:
         """Return the wind velocity (m/s, world axes) at `position` (m) from this grid point to the next."""
-        velocity_now = velocity(self._air, self._states, position, math.exp)
+        return velocity(self._air, self._states, position, math.exp)
+
+    def next(self, position: Vector3[float]) -> Vector3[float]:
+        """Return the wind velocity as `at`, then advance to the next grid point."""
+        velocity_now = self.at(position)
         if not self._noise:
             block = np.arange(self._read, self._read + BLOCK_SIZE, dtype=np.uint64)
             self._noise = uniform_noise(self._key, block).T[::-1].tolist()  # read from the end

@@ -52,7 +52,7 @@ class InteractiveMixin(StepLimitMixin, abc.ABC):
         Raises:
             RobotError: for a site that the robot does not have.
         """
-        sites = [name for name, _, _ in self.nominal_robot.sites]
+        sites = self.words["site"]
         if site not in sites:
             raise RobotError("site", site, ", ".join(map(repr, sites)))
         first, steps = self.elapsed, max(1, round(duration / self._engine.time_step))

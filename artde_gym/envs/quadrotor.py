@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, cast
 
 import gymnasium as gym
 import numpy as np
@@ -25,14 +25,15 @@ from artde_gym.envs.options import disturbances_in, warn_of_idle
 from artde_gym.envs.quadrotor_sensors import Measurement, Sensors
 from artde_gym.envs.view import View
 from artde_gym.errors import OptionError
+from artde_gym.kit import PAYLOAD
 from artde_gym.multibody.spec import Vector
 from artde_gym.robots.q450 import model as robot
 from artde_gym.robots.q450 import task
-from artde_gym.robots.q450.infinity import START
 from artde_gym.robots.q450.rotors import Rotors
 from artde_gym.sim.engine import Camera, Engine
 from artde_gym.sim.factory import EngineName, make_engine, resolve_engine
 from artde_gym.sim.rotation import matrix
+from artde_gym.sim.sling import Sling
 
 TIME_STEP = 0.001  # s, of the physics
 STEPS = 5  # physics steps from one grid point to the next
@@ -90,6 +91,9 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
     robot_name: ClassVar[str] = "q450"
     metrics_spec = task.METRICS_SPEC
     fall_reasons: ClassVar[Sequence[str]] = task.FALL_REASONS
+    reward_scales: ClassVar[Mapping[str, float]] = task.REWARD_SCALES
+    default_disturbances: ClassVar[Mapping[str, Any]] = task.DEFAULT_DISTURBANCES
+    lift: ClassVar[float] = 0.0
     words = task.WORDS
 
     @known_arguments
@@ -108,27 +112,28 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise OptionError("render_mode", render_mode, "None, 'rgb_array'")
         self.render_mode = render_mode
-        self._disturbances = task.parse(task.DEFAULT_DISTURBANCES if disturbances is None else disturbances)
+        self._disturbances = task.parse(self.default_disturbances if disturbances is None else disturbances)
         self._ticks = steps_per_period(control_period, GRID)
         self.control_period = self._ticks * GRID
         self.measurement = measurement
         self.duration = duration
-        self._sensors = Sensors(1, measurement, self.control_period, np.float64)
+        self._sensors = Sensors(1, measurement, self.control_period, np.float64, self.observation_layout)
         self.nominal_robot = robot.q450()
-        self._plan = task.plan(duration, self.control_period)
+        self._plan = task.plan(duration, self.control_period, self.lift)
         self._last = len(self._plan) - 1
-        self.observation_space = task.OBSERVATION.box()
+        self.observation_space = self.observation_layout.box()
         self.action_space = task.ACTION.box()
         self._low, self._high = self.action_space.low, self.action_space.high
         self.engine_name = resolve_engine(engine)
-        self._engine: Engine = make_engine(
-            self.engine_name, self.nominal_robot, TIME_STEP, renders=render_mode is not None
-        )
-        self.view = View(
-            self._engine, CAMERA._replace(width=width, height=height), self.control_period, CAMERA_SHARE, CAMERA_SLACK
-        )
+        engine_alone = make_engine(self.engine_name, self.nominal_robot, TIME_STEP, renders=render_mode is not None)
+        self._sling = Sling(engine_alone)
+        self._engine = cast(Engine, self._sling)
+        x, y, z = PATH_CENTER
+        self._home: Vector = (x, y, z + self.lift)
+        camera = CAMERA._replace(target=self._home, width=width, height=height)
+        self.view = View(self._engine, camera, self.control_period, CAMERA_SHARE, CAMERA_SLACK)
         self.metadata = {**self.metadata, **self.view.metadata}
-        self._engine.reset(START, _NO_JOINTS)
+        self._engine.reset(task.start({}, self.lift), _NO_JOINTS)
         self._placed = self._engine.save_state()
         self._k, self._over = 0, True  # no step before the first reset
         self._schedule = Schedule({}, TIME_STEP)
@@ -153,7 +158,7 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
         self._sample(sampled)
         self._begin(sampled, draw_keys(self.np_random, task.STREAMS))
         self.view.reset()
-        return self._measure(), self._info(dict.fromkeys(task.REWARD_SCALES, 0.0), (), ())
+        return self._measure(), self._info(dict.fromkeys(self.reward_scales, 0.0), (), ())
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Apply a wrench for one control period.
@@ -171,7 +176,7 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
         self._k += 1
         observation = self._measure()
         terms = self._reward_terms(before)
-        reward = self.control_period * total(map(operator.mul, task.REWARD_SCALES.values(), terms.values()))
+        reward = self.control_period * total(map(operator.mul, self.reward_scales.values(), terms.values()))
         falls = self._falls()
         terminated, truncated = any(falls), self._k >= self._last
         self._over = terminated or truncated
@@ -185,7 +190,10 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
         step = self.elapsed
         pushes = self._schedule.acting(step)
         path = self._plan[:, :3]
-        return self.view.picture(step * TIME_STEP, PATH_CENTER, pushes, self._sampled, path=path, over=self._over)
+        cable = self._sling.curve()
+        return self.view.picture(
+            step * TIME_STEP, self._home, pushes, self._sampled, path=path, cable=cable, over=self._over
+        )
 
     def close(self) -> None:
         self._engine.close()
@@ -204,11 +212,11 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
         engine = self._engine
         engine.restore_state(self._placed)
         if "initial_position" in sampled:
-            engine.reset(task.start(sampled), _NO_JOINTS)
+            engine.reset(task.start(sampled, self.lift), _NO_JOINTS)
         engine.scale_masses(sampled.get("mass_scale", {}).get("factor", 1.0))
         self._schedule = Schedule(sampled, TIME_STEP)
         self._schedule.start(engine)
-        self._rotors = Rotors(sampled, task.hover_thrusts(sampled), TIME_STEP, self._ticks * STEPS)
+        self._rotors = Rotors(sampled, task.hover_thrusts(sampled, self.lift), TIME_STEP, self._ticks * STEPS)
         self._wrench = robot.MIXER @ self._rotors.thrusts
         self._wind = Wind(sampled["wind"], keys[0]) if "wind" in sampled else None
         self._ground_effect = sampled.get("ground_effect", {}).get("strength", 0.0)
@@ -216,6 +224,7 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
         self._effects.begin(0, sampled)
         self._k = 0
         self._over = False
+        self._pulled = 0.0
         self._read()
 
     def _info(self, terms: dict[str, float], falls: Sequence[bool], events: Sequence[str]) -> dict[str, Any]:
@@ -231,6 +240,7 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
         wrenches = thrusts @ robot.MIXER.T
         rows = wrenches.tolist()
         quiet = self._schedule.quiet(first, first + steps)
+        pulled = 0.0
         for start in range(0, steps, STEPS):
             end = start + STEPS
             if self._ground_effect:
@@ -244,8 +254,10 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
                 engine.apply_base_wrench((drag_x, drag_y, drag_z + u1), (u2, u3, u4))
                 load_base(engine, load, 0)
                 engine.step(_NO_JOINTS)
+                pulled += self._sling.tension
             self._read()
         self._wrench = np.add.reduce(wrenches) / steps
+        self._pulled = pulled * TIME_STEP  # impulse of the cable (N s)
         return events
 
     def _read(self) -> None:
@@ -255,6 +267,8 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
     def _drag(self) -> Vector:
         """Return the aerodynamic force until the next grid point (N, body axes)."""
         state, (xx, xy, xz, yx, yy, yz, zx, zy, zz) = self._state, self._rot
+        if self._wind is not None:
+            self._sling.wind = self._wind.at(self._sling.site(PAYLOAD)) if self._sling.length else _NOTHING
         wx, wy, wz = _NOTHING if self._wind is None else self._wind.next(state.position)
         vx, vy, vz = state.velocity
         x, y, z = robot.DRAG * (wx - vx), robot.DRAG * (wy - vy), robot.DRAG * (wz - vz)
@@ -270,16 +284,20 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
         state, rot = self._state, self._rot
         wx, wy, wz = state.angular_velocity
         rates = (rot[i] * wx + rot[3 + i] * wy + rot[6 + i] * wz for i in range(3))
-        observation = np.empty(task.OBSERVATION.size)
+        observation = np.empty(self.observation_layout.size)
         observation[task.MEASURED] = (*state.position, *state.velocity, *rot, *rates)
         plan = self._plan[self._k]
         observation[task.REFERENCE] = plan[:-1]
         observation[task.WRENCH] = self._wrench
         observation[task.THRUST] = self._rotors.thrusts
         observation[task.PHASE] = plan[-1]
+        self._look(observation)
         if not self._sensors.ideal:
             self._sensors.measure(observation[:, None], np.array([self._k]))
         return observation
+
+    def _look(self, observation: Array) -> None:
+        """Fill in what else is observed."""
 
     def _reward_terms(self, before: Array) -> dict[str, float]:
         plan = self._plan[self._k, :6].tolist()
@@ -290,6 +308,6 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
         effort, smoothness = float(thrusts.dot(thrusts)), float(change.dot(change))
         return task.reward_terms(error, velocity_error, self._rot[8], effort, smoothness, math.exp)
 
-    def _falls(self) -> tuple[bool, bool, bool]:
+    def _falls(self) -> tuple[bool, ...]:
         spin = math.hypot(*self._state.angular_velocity) ** 2
         return task.falls(self._state.position, self._rot[8], spin)

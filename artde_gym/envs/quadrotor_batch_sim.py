@@ -20,9 +20,12 @@ from artde_gym.disturbances.kinds import OWN, RobotStates
 from artde_gym.disturbances.noise import uniform_noise
 from artde_gym.disturbances.schedule import ATTACHED, DROPPED, NEVER, PUSH_BEGINS, PUSH_ENDS, Push
 from artde_gym.disturbances.wind import GRID, Air, advance, air, processes, velocity
+from artde_gym.kit import PAYLOAD
 from artde_gym.multibody.lag import follow, lag_shares
+from artde_gym.multibody.spec import Vector
 from artde_gym.robots.q450 import model as robot
 from artde_gym.robots.q450 import task
+from artde_gym.sim.cables import Cables
 from artde_gym.sim.engine import PAYLOAD_RADIUS
 from artde_gym.sim.rigid_bodies import MassProperties, RigidBodies, composite, cross, times, transposed_times
 
@@ -48,17 +51,20 @@ class QuadrotorBatchSim:
         n: number of vehicles.
         steps: grid steps per control period.
         dtype: data type of all numbers.
+        lift: height by which the path is raised (m).
 
     Attributes:
         bodies: rigid-body states.
         thrusts: current thrusts of the rotors (4, n) (N).
+        cables: cables with loads; None before a vehicle has had one.
+        pulled: impulse of each cable during the last control period (n,) (N s).
         wrenches: mean [u1, u2, u3, u4] of the last control period (4, n) (N, Nm), without the gain near the ground.
     """
 
-    def __init__(self, n: int, steps: int, dtype: DTypeLike) -> None:
+    def __init__(self, n: int, steps: int, dtype: DTypeLike, lift: float = 0.0) -> None:
         self.bodies = RigidBodies(n, dtype)
         self.thrusts, self.wrenches = np.zeros((4, n), dtype), np.zeros((4, n), dtype)
-        self._steps = steps
+        self._steps, self._lift = steps, lift
         self._step = 0  # since construction
         self._begun = np.zeros(n, np.int64)  # step at which each episode began
         self._agenda: list[list[_Event]] = [[] for _ in range(n)]  # of each vehicle, the next event last
@@ -75,6 +81,10 @@ class QuadrotorBatchSim:
         self._ground_effect = np.zeros(n, dtype)
         self._pushes = np.zeros((0, 3, n), dtype)  # forces that act (N, world axes)
         self._places = np.zeros((0, 3, n), dtype)  # points of application (m, body axes)
+        self._at_load = np.zeros((0, n), np.bool_)  # which of them push the payload
+        self._carries = np.zeros(n, np.bool_)  # a rigidly attached payload
+        self.cables: Cables | None = None  # once a vehicle needs one
+        self.pulled = np.zeros(n, dtype)
         self._effects = Effects(n, task.WORDS)
 
     def begin(self, vehicle: int, sampled: Mapping[str, Any], key: np.uint64) -> None:
@@ -93,20 +103,42 @@ class QuadrotorBatchSim:
         factor = sampled.get("mass_scale", {}).get("factor", 1.0)
         bare = MassProperties(factor * robot.MASS, (0.0, 0.0, 0.0), factor * np.diag(robot.INERTIA))
         events = [*self._push_events(vehicle, sampled), *self._loss_events(vehicle, sampled)]
-        change = partial(self.bodies.set_properties, vehicle)
-        change(bare)
+        self._fix(vehicle, bare, False)
+        if self.cables is not None:
+            self.cables.clear(vehicle)
+        self.pulled[vehicle] = 0.0
         payload = sampled.get("payload")
+        start: Vector = task.start(sampled, self._lift)
         if payload is not None and payload["detach_time"] > payload["attach_time"]:
-            loaded = composite(bare, _ball(payload))
+            attach, drop = self._changes(vehicle, bare, payload)
             if payload["attach_time"] == 0:
-                change(loaded)
+                self.bodies.place(vehicle, start)
+                attach()
             else:
-                events.append(_Event(round(payload["attach_time"] / GRID), (ATTACHED,), partial(change, loaded)))
-            events.append(_Event(round(payload["detach_time"] / GRID), (DROPPED,), partial(change, bare)))
-        self.bodies.place(vehicle, task.start(sampled))
+                events.append(_Event(round(payload["attach_time"] / GRID), (ATTACHED,), attach))
+            events.append(_Event(round(payload["detach_time"] / GRID), (DROPPED,), drop))
+        if not (self.cables is not None and self.cables.held[vehicle]):
+            self.bodies.place(vehicle, start)
         events.sort(key=lambda event: event.step)
         self._agenda[vehicle] = events[::-1]
         self._await(vehicle)
+
+    def _changes(
+        self, vehicle: int, bare: MassProperties, payload: Mapping[str, Any]
+    ) -> tuple[Callable[[], None], Callable[[], None]]:
+        """Return the functions that attach a payload and that drop it."""
+        if not payload["cable"]:
+            fixed = composite(bare, _ball(payload))
+            return partial(self._fix, vehicle, fixed, True), partial(self._fix, vehicle, bare, False)
+        if self.cables is None:
+            self.cables = Cables(len(self._begun), self.thrusts.dtype)
+        hang = partial(self.cables.hang, vehicle, self.bodies, payload["mass"], payload["position"], payload["cable"])
+        return hang, partial(self.cables.release, vehicle)
+
+    def _fix(self, vehicle: int, properties: MassProperties, carries: bool) -> None:
+        """Make a vehicle and what it carries one body."""
+        self.bodies.set_properties(vehicle, properties)
+        self._carries[vehicle] = carries
 
     def rest(self, vehicle: int) -> None:
         """Cancel all events of a vehicle until its next episode."""
@@ -123,7 +155,8 @@ class QuadrotorBatchSim:
             part[..., vehicles] = before
 
     def _moving(self) -> tuple[Array, ...]:
-        return *self.bodies.motion(), self.thrusts, self.wrenches
+        loads = () if self.cables is None else (*self.cables.motion(), self.pulled)
+        return *self.bodies.motion(), self.thrusts, self.wrenches, *loads
 
     def advance(self, commands: Array) -> dict[int, list[str]]:
         """Apply wrenches [u1, u2, u3, u4] (4, n) (N, Nm) for one control period; return events by vehicle."""
@@ -132,26 +165,44 @@ class QuadrotorBatchSim:
         goals = aims * self._left
         noise = self._noise() if self._windy else None
         total = np.zeros_like(self.thrusts)
+        self.pulled = np.zeros_like(self.pulled)
         for step in range(self._steps):
-            bodies.drift(GRID if step else 0.5 * GRID)
+            self._drift(GRID if step else 0.5 * GRID)
             if self._step >= self._soonest:
                 self._happen(events)
                 goals = aims * self._left
             self.thrusts, mean = follow(self.thrusts, goals, *self._shares)
             total += mean
             origin = bodies.origin()
-            wind = 0.0 if noise is None else self._blow(origin, noise[:, step])
+            wind = 0.0 if noise is None else self._wind_at(origin)
             u1, *torques = robot.wrench(*(mean * self._gains(origin[2])))
             force = bodies.rot[:, 2] * u1
             force += robot.DRAG * (wind - bodies.origin_velocity())
             bodies.kick(GRID, *self._loaded(*self._pushed(force, np.stack(torques)), origin))
+            if self.cables is not None:
+                self._swing(self.cables)
+            if noise is not None:
+                self._wind = advance(self._keep, self._kick, self._wind, noise[:, step])
             self._step += 1
-        bodies.drift(0.5 * GRID)
+        self._drift(0.5 * GRID)
         self.wrenches = np.stack(robot.wrench(*(total / self._steps)))
         return events
 
+    def _drift(self, duration: float) -> None:
+        self.bodies.drift(duration)
+        if self.cables is not None:
+            self.cables.drift(duration)
+
+    def _swing(self, cables: Cables) -> None:
+        """Let the loads swing through a step."""
+        force = np.zeros_like(cables.position)
+        for push, at_load in zip(self._pushes, self._at_load, strict=True):
+            np.add(force, push, out=force, where=at_load)
+        cables.kick(self.bodies, GRID, force, self._wind_at(cables.position) if self._windy else None)
+        self.pulled += GRID * cables.tension
+
     def _begin_rotors(self, vehicle: int, sampled: Mapping[str, Any]) -> None:
-        hover = task.hover_thrusts(sampled)
+        hover = task.hover_thrusts(sampled, self._lift)
         self.thrusts[:, vehicle] = hover
         self.wrenches[:, vehicle] = robot.wrench(*hover)
         constant = sampled.get("motor_lag", {}).get("time_constant", robot.ROTOR_LAG)
@@ -178,13 +229,11 @@ class QuadrotorBatchSim:
         index = (self._step - self._begun).astype(np.uint64) + np.arange(self._steps, dtype=np.uint64)[:, None]
         return uniform_noise(self._keys, index, self.thrusts.dtype)
 
-    def _blow(self, origin: Array, noise: Array) -> Array:
-        """Return the wind velocity at each vehicle during this step (3, n) (m/s, world axes)."""
-        (x, y, z), (ambient_x, ambient_y, ambient_z, turbulence) = origin, self._wind
+    def _wind_at(self, points: Array) -> Array:
+        """Return the wind velocity at a point of each vehicle during this step (3, n) (m/s, world axes)."""
+        (x, y, z), (ambient_x, ambient_y, ambient_z, turbulence) = points, self._wind
         states = ambient_x, ambient_y, ambient_z, turbulence
-        wind = np.stack(velocity(Air._make(self._air), states, (x, y, z), np.exp))
-        self._wind = advance(self._keep, self._kick, self._wind, noise)
-        return wind
+        return np.stack(velocity(Air._make(self._air), states, (x, y, z), np.exp))
 
     def _gains(self, height: Array) -> Array | float:
         """Return the gain of each rotor's thrust near the ground (4, n)."""
@@ -195,8 +244,8 @@ class QuadrotorBatchSim:
 
     def _pushed(self, force: Array, torque: Array) -> tuple[Array, Array]:
         """Return force and torque with active pushes added."""
-        for push, place in zip(self._pushes, self._places, strict=True):
-            acts = push.any(axis=0)
+        for push, place, at_load in zip(self._pushes, self._places, self._at_load, strict=True):
+            acts = push.any(axis=0) & (~at_load | self._carries)
             if acts.any():
                 np.add(force, push, out=force, where=acts)
                 np.add(torque, cross(place, transposed_times(self.bodies.rot, push)), out=torque, where=acts)
@@ -226,10 +275,12 @@ class QuadrotorBatchSim:
         if missing > 0:
             more = np.zeros((missing, *self._pushes.shape[1:]), self._pushes.dtype)
             self._pushes, self._places = (np.concatenate([slots, more]) for slots in (self._pushes, self._places))
-        self._pushes[..., vehicle] = 0.0
+            self._at_load = np.concatenate([self._at_load, np.zeros_like(more[:, 0], np.bool_)])
+        self._pushes[..., vehicle], self._at_load[:, vehicle] = 0.0, False
         events: list[_Event] = []
         for slot, push in enumerate(pushes):
-            self._places[slot, :, vehicle] = _SITES[push.site]
+            self._at_load[slot, vehicle] = push.site == PAYLOAD
+            self._places[slot, :, vehicle] = _SITES.get(push.site) or sampled["payload"]["position"]
             first, last = push.first // PARTS, push.end // PARTS
             for step in sorted({first, first + 1, last, last + 1}):
                 covered = min(push.end, (step + 1) * PARTS) - max(push.first, step * PARTS)

@@ -65,8 +65,10 @@ class QuadInfinityPayloadVectorEnv(BaseVectorEnv):
     observation_layout = task.OBSERVATION
     robot_name: ClassVar[str] = "q450"
     metrics_spec = task.METRICS_SPEC
-    reward_scales = task.REWARD_SCALES
-    fall_reasons = task.FALL_REASONS
+    reward_scales: ClassVar[Mapping[str, float]] = task.REWARD_SCALES
+    default_disturbances: ClassVar[Mapping[str, Any]] = task.DEFAULT_DISTURBANCES
+    lift: ClassVar[float] = 0.0
+    fall_reasons: ClassVar[Sequence[str]] = task.FALL_REASONS
     allowed_action = "[u1 (N), u2, u3, u4 (Nm)]"
     own_engine = "numpy"
     words = task.WORDS
@@ -96,20 +98,20 @@ class QuadInfinityPayloadVectorEnv(BaseVectorEnv):
             autoreset_mode=autoreset_mode,
             max_episode_steps=max_episode_steps,
         )
-        self._disturbances = task.parse(task.DEFAULT_DISTURBANCES if disturbances is None else disturbances)
+        self._disturbances = task.parse(self.default_disturbances if disturbances is None else disturbances)
         steps = steps_per_period(control_period, GRID)
         self.control_period = steps * GRID
         self.measurement = measurement
         self.duration = duration
-        self._sensors = Sensors(num_envs, measurement, self.control_period, self.dtype)
+        self._sensors = Sensors(num_envs, measurement, self.control_period, self.dtype, self.observation_layout)
         self.nominal_robot = robot.q450()
-        self._plan = np.ascontiguousarray(task.plan(duration, self.control_period).T, dtype=self.dtype)
+        self._plan = np.ascontiguousarray(task.plan(duration, self.control_period, self.lift).T, dtype=self.dtype)
         last = self._plan.shape[1] - 1
         self._last = min(last, self._limit or last)
         warn_of_idle(self._disturbances, self._last * self.control_period)
         sizes = [min(FLEET, num_envs - first) for first in range(0, num_envs, FLEET)]
         self._fleets = [
-            (slice(first, first + size), QuadrotorBatchSim(size, steps, self.dtype))
+            (slice(first, first + size), QuadrotorBatchSim(size, steps, self.dtype, self.lift))
             for first, size in zip(range(0, num_envs, FLEET), sizes, strict=True)
         ]
         self._before: list[Array] = []  # thrusts of each fleet one control period ago
@@ -143,7 +145,7 @@ class QuadInfinityPayloadVectorEnv(BaseVectorEnv):
             fleet.rest(i - part.start)
 
     def _truth(self) -> Array:
-        out = np.empty((task.OBSERVATION.size, self.num_envs), self.dtype)
+        out = np.empty((self.observation_layout.size, self.num_envs), self.dtype)
         together = self._k.min() == self._k.max()
         for part, fleet in self._fleets:
             block, bodies = out[:, part], fleet.bodies
@@ -156,7 +158,11 @@ class QuadInfinityPayloadVectorEnv(BaseVectorEnv):
             block[task.WRENCH] = fleet.wrenches
             block[task.THRUST] = fleet.thrusts
             block[task.PHASE] = plan[-1]
+            self._look(block, fleet)
         return out.T
+
+    def _look(self, block: Array, fleet: QuadrotorBatchSim) -> None:
+        """Fill in what else is observed of a fleet."""
 
     def _measure(self, observations: Array, new: Mask) -> None:
         if not self._sensors.ideal:
@@ -172,16 +178,16 @@ class QuadInfinityPayloadVectorEnv(BaseVectorEnv):
             up = fleet.bodies.rot[2, 2]
             change = fleet.thrusts - thrusts
             own = task.reward_terms(
-                _square(error), _square(velocity_error), up, _square(fleet.thrusts), _square(change), np.exp
+                square(error), square(velocity_error), up, square(fleet.thrusts), square(change), np.exp
             )
             for name, values in own.items():
                 terms[name][part] = values
             x, y, z = block[task.POSITION]
-            falls[:, part] = task.falls((x, y, z), up, _square(block[task.RATES]))
+            falls[:, part] = task.falls((x, y, z), up, square(block[task.RATES]))
         return terms, list(falls)
 
 
-def _square(vectors: Array) -> Array:
+def square(vectors: Array) -> Array:
     """Return squared norms of vectors (size, n), summed in a fixed order."""
     squares = vectors * vectors
     total = squares[0]

@@ -127,7 +127,7 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
     def _score(self, truth: Array) -> tuple[dict[str, Array], Sequence[Mask]]:
         """Return the terms of the reward, and masks of the reasons for a fall."""
 
-    def _tell(self) -> dict[str, Array]:
+    def _tell(self) -> Columns:
         """Return further entries of `info` by name, one value per environment."""
         return {}
 

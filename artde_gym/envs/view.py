@@ -15,7 +15,7 @@ from artde_gym.disturbances.schedule import Push
 from artde_gym.errors import OptionError
 from artde_gym.multibody.spec import Vector
 from artde_gym.sim.camera import Camera
-from artde_gym.sim.engine import Engine
+from artde_gym.sim.engine import PAYLOAD_LOOK, Engine
 
 RATE = 30.0  # frames per simulated second
 MAX_FPS, SLOW_FPS = 100.0, 50.0  # frames/s: the most that a video can have; its rate in slow motion
@@ -72,6 +72,7 @@ class View:
         disturbances: Mapping[str, Any],
         *,
         path: ArrayLike | None = None,
+        cable: Sequence[Vector] = (),
         over: bool = False,
     ) -> NDArray[np.uint8]:
         """Return the frame at a time: a new one `RATE` times per second and at the end, else the last one.
@@ -84,6 +85,7 @@ class View:
             pushes: active pushes.
             disturbances: sampled disturbances of the episode.
             path: points (n, 3) of a line (m).
+            cable: points from the hook to the payload (m); empty without a cable.
             over: whether the episode has ended.
         """
         key = (int(time_s * RATE + 1e-6), over)
@@ -92,6 +94,8 @@ class View:
             drawn = Image.fromarray(self._engine.render(camera))
             if path is not None:
                 _line(drawn, camera.pixels(path), PATH)
+            if cable:
+                _rope(drawn, camera, cable)
             for push in pushes:
                 _arrow(drawn, camera, self._engine.site(push.site), push.force)
             acting = [f"push {np.linalg.norm(push.force):.3g} N" for push in pushes]
@@ -165,6 +169,17 @@ def _line(picture: Image.Image, points: Array, color: tuple[int, int, int]) -> N
     whole = np.isfinite(points).all(axis=1)
     ImageDraw.Draw(mask).line([*map(tuple, (OVERSAMPLING * points[whole]).tolist())], 150, OVERSAMPLING)
     picture.paste(color, None, mask.reduce(OVERSAMPLING))
+
+
+def _rope(picture: Image.Image, camera: Camera, points: Sequence[Vector]) -> None:
+    """Draw a cable up to the surface of its load."""
+    ends = np.linalg.norm(np.subtract(points, points[-1]), axis=1) > PAYLOAD_LOOK
+    seen = camera.pixels(np.asarray(points)[ends]) if ends.any() else np.zeros((0, 2))
+    if len(seen) > 1 and np.isfinite(seen).all():
+        mask = Image.new("L", (OVERSAMPLING * picture.width, OVERSAMPLING * picture.height))
+        wide = max(2, round(OVERSAMPLING * picture.height / 240))
+        ImageDraw.Draw(mask).line([*map(tuple, (OVERSAMPLING * seen).tolist())], 255, wide, "curve")
+        picture.paste(INK, None, mask.reduce(OVERSAMPLING))
 
 
 def _write(picture: Image.Image, lines: Sequence[str]) -> None:

@@ -73,5 +73,6 @@ def _entries(kind: str, given: Any, robot: str | None) -> Any:
 
 def _full(kind: str, given: Any, robot: str | None) -> dict[str, Any]:
     known = DISTURBANCES[kind]
-    defaults = {one.name: known.default_of(one, robot) for one in known.parameters if one.default is not None}
-    return {**defaults, **parameters_of(kind, given)}
+    own, parameters = parameters_of(kind, given), known.parameters_for(robot)
+    defaults = {one.name: known.default_of(one, robot, own) for one in parameters if one.default is not None}
+    return {**defaults, **own}

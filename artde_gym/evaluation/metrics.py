@@ -20,6 +20,9 @@ Per axis: `rmse_u_<axis>`, `max_abs_error_u_<axis>`, and for each effort `rms_<e
   band, or below its largest value in the 2 s before if that is more, for 1 s; infinite if it never does, including a
   fall after the event's beginning. NaN if the episode ended too early to decide: before the event, less than 1 s
   after it, or when the error had stayed there for less than 1 s.
+- `rms_<watched>_<unit>`, `max_<watched>_<unit>`: of signals that an environment watches beside its errors, such as a
+  swing; `peak_<watched>_<unit>_<push>` and `recovery_time_s_<push>_<watched>`: effect of a push on them, as above, but
+  with their own band alone, and an infinite time also if the signal ends before it has settled.
 - The metrics of `artde_gym.evaluation.registered`, by name.
 """
 
@@ -36,13 +39,14 @@ from artde_gym.disturbances.kinds import NEVER
 from artde_gym.errors import OptionError
 from artde_gym.evaluation.registered import METRICS, Metric
 from artde_gym.layout import Layout
-from artde_gym.metrics_spec import Fields, MetricsSpec, TrackedSignal
+from artde_gym.metrics_spec import Fields, MetricsSpec, TrackedSignal, WatchedSignal
 
 GRAVITY = 9.81  # m/s^2
 BEFORE = 2.0  # s before a disturbance; the largest error in it counts as recovered too
 AFTER = 2.0  # s after a disturbance in which its peak is searched
 HOLD = 1.0  # s for which a recovered error must stay in its band
 NEAR = 0.1  # m; shorter distances have no cost of transport
+PUSH = "push"  # prefix of a push's number
 END = 2**62  # sample index that no episode reaches
 
 Span = tuple[float, float]
@@ -52,7 +56,7 @@ Mask = NDArray[np.bool_]
 def events_of(disturbances: Mapping[str, Any]) -> dict[str, Span]:
     """Return name -> (begin, end) (s) of each push, and of the payload's drop if there is one."""
     events = {
-        f"push{i}": (push["start"], push["start"] + push["duration"])
+        f"{PUSH}{i}": (push["start"], push["start"] + push["duration"])
         for i, push in enumerate(disturbances.get("push", ()))
     }
     payload = disturbances.get("payload", {"attach_time": 0.0, "detach_time": NEVER})
@@ -114,6 +118,7 @@ class Metrics:
         self._events = {
             name: _Event([one.get(name, never) for one in events], tracking.settling_band, period) for name in names
         }
+        self._watched = [_Watched(watched, events, period) for watched in tracking.watched]
         self._registered = [_Registered(metric, n) for metric in METRICS.values()]
         self._count = np.zeros(n, dtype=np.int64)  # samples of each episode so far
 
@@ -122,7 +127,8 @@ class Metrics:
 
         Args:
             start: index of the first sample; an episode's first sample is 0.
-            fields: observations by name, (samples, n, size).
+            fields: observations by name, (samples, n, size), and recorded entries of `info` where any is watched
+                (samples, n).
             diagnostics: of the policy at these samples, (samples, n, ...), or at some of them if no error depends on
                 them; None after the last decision of the policy.
             live: (n,), the episodes that these samples belong to; None for all.
@@ -159,6 +165,8 @@ class Metrics:
         for column, name in tracking.diagnostic_means.items():
             if diagnostics is not None and name in diagnostics:
                 self._means[column].add(diagnostics[name], live)
+        for watched in self._watched:
+            watched.add(fields, start, live)
         for registered in self._registered:
             registered.add(fields, diagnostics or {}, live)
 
@@ -209,6 +217,8 @@ class Metrics:
             columns["cost_of_transport"] = energy / (GRAVITY * carried)
         columns |= {column: squares.rms_of_all for column, squares in self._sigmas.items()}
         columns |= {column: mean.value for column, mean in self._means.items()}
+        for watched in self._watched:
+            columns |= watched.columns(self._count, fell)
         for registered in self._registered:
             if registered.name in columns:
                 raise OptionError("name of a metric", registered.name, "a name without another column")
@@ -251,19 +261,55 @@ class _Squares:
 
 
 class _Mean:
-    """Means of numbers in n episodes."""
+    """Means of numbers in n episodes; a NaN is no number."""
 
     def __init__(self, n: int) -> None:
         self._sums, self._number = np.zeros(n), np.zeros(n, dtype=np.int64)
 
     def add(self, values: Array, live: Mask | None) -> None:
         """Add values (samples, n)."""
-        self._sums = _added(self._sums, values, live)
-        self._number += len(values) if live is None else len(values) * live
+        known = ~np.isnan(values)
+        self._sums = _added(self._sums, np.where(known, values, 0.0), live)
+        self._number += known.sum(axis=0) if live is None else known.sum(axis=0) * live
 
     @property
     def value(self) -> Array:
         return self._sums / _or_nan(self._number)
+
+
+class _Watched:
+    """A watched signal in n episodes, and the effect of pushes on it."""
+
+    def __init__(self, watched: WatchedSignal, events: Sequence[Mapping[str, Span]], period: float) -> None:
+        self._watched = watched
+        self._mean, self._largest = _Mean(len(events)), np.full(len(events), np.nan)
+        names = dict.fromkeys(name for one in events for name in one if name.startswith(PUSH))
+        never = (np.inf, np.inf)
+        self._events = {
+            name: _Event([one.get(name, never) for one in events], watched.settling_band, period, widens=False)
+            for name in names
+        }
+
+    def add(self, fields: Fields, start: int, live: Mask | None) -> None:
+        """Take in a block of samples, of which the first is sample `start`."""
+        size = self._watched.size(fields)
+        self._mean.add(np.square(size), live)
+        self._largest = np.fmax(self._largest, _largest(size, live))
+        for event in self._events.values():
+            event.add(size, start, live)
+
+    def columns(self, count: NDArray[np.int64], fell: Mask) -> dict[str, Array]:
+        """Columns of episodes of so many samples, some of which ended in a fall."""
+        name, unit, scale = self._watched.name, self._watched.unit, self._watched.scale
+        columns: dict[str, Array] = {
+            f"rms_{name}_{unit}": scale * np.sqrt(self._mean.value),
+            f"max_{name}_{unit}": scale * self._largest,
+        }
+        for event, found in self._events.items():
+            columns[f"peak_{name}_{unit}_{event}"] = scale * found.peak
+            if np.isfinite(self._watched.settling_band):
+                columns[f"recovery_time_s_{event}_{name}"] = found.recovery_time(count, fell)
+        return columns
 
 
 class _Registered:
@@ -319,10 +365,10 @@ class _Variation:
 class _Event:
     """Peak and recovery after a disturbance in n episodes."""
 
-    def __init__(self, spans: Sequence[Span], band: float, period: float) -> None:
+    def __init__(self, spans: Sequence[Span], band: float, period: float, *, widens: bool = True) -> None:
         self._begin, self._end = np.array([[_sample(time, period) for time in span] for span in spans]).T
         self._before, self._after, self._hold = (_sample(time, period) for time in (BEFORE, AFTER, HOLD))
-        self._period = period
+        self._period, self._widens = period, widens
         self._band = np.full(len(spans), band)
         self._outside = self._end - 1  # the last sample outside the band since the end of the disturbance
         self._recovered = np.full(len(spans), -1)  # the first sample of the recovery, once it has held
@@ -334,12 +380,12 @@ class _Event:
         if k[-1, 0] < self._begin.min() - self._before:
             return
         counts = True if live is None else live
-        before = (k >= self._begin - self._before) & (k <= self._begin) & counts
-        self._band = np.maximum(self._band, np.where(before, size, 0.0).max(axis=0))
+        before = (k >= self._begin - self._before) & (k <= self._begin) & counts & self._widens
+        self._band = np.fmax(self._band, np.where(before, size, 0.0).max(axis=0))
         near = (k >= self._begin) & (k <= self._end + self._after) & counts
         self.peak = np.fmax(self.peak, np.fmax.reduce(np.where(near, size, np.nan), axis=0))
         since = (k >= self._end) & counts
-        outside = np.maximum.accumulate(np.where(since & (size > self._band), k, self._outside), axis=0)
+        outside = np.maximum.accumulate(np.where(since & ~(size <= self._band), k, self._outside), axis=0)
         held = since & (k - outside >= self._hold)
         here = held.any(axis=0) & (self._recovered < 0)
         recovered = np.take_along_axis(outside, held.argmax(axis=0)[None], axis=0)[0] + 1

@@ -67,6 +67,7 @@ def run_episode(
     observations, diagnostics, told = [np.array(observation)], [], [_told(plant, info)]  # copies: policies write
     poses = _Poses(plant)
     poses.look(0)
+    tells = told_every(plant, stride)
     state, episode_start = None, True
     terminated = truncated = False
     total = 0.0
@@ -79,7 +80,7 @@ def run_episode(
         observation, reward, terminated, truncated, info = env.step(action)
         total += float(reward)
         observations.append(np.array(observation))
-        if count % stride == 0:
+        if count % tells == 0:
             told.append(_told(plant, info))
         poses.look(count)
         if on_progress is not None and count % report_every == 0:
@@ -87,14 +88,16 @@ def run_episode(
 
     fields = plant.observation_layout.split(np.array(observations))
     inside = stack(diagnostics)
+    known = stack(told)
     metrics = metrics_for(plant, [disturbances], phases)
     last = len(observations) - 1
-    metrics.add(0, _part(fields, np.s_[:last, None]), _part(inside, np.s_[:, None]))
-    metrics.add(last, _part(fields, np.s_[last:, None]), None)  # no decision follows the last observation
+    measured = fields | (known if tells == 1 else {})
+    metrics.add(0, _part(measured, np.s_[:last, None]), _part(inside, np.s_[:, None]))
+    metrics.add(last, _part(measured, np.s_[last:, None]), None)  # no decision follows the last observation
     reason = fall_reason(info) if terminated else None
     row = row_of(reason, info["time_s"], total, metrics.rows(np.array([bool(terminated)]))[0], disturbances)
     kept = slice(None, None, stride // looks)
-    seen = _part(fields, slice(None, None, stride)) | stack(told)
+    seen = _part(fields, slice(None, None, stride)) | _part(known, slice(None, None, stride // tells))
     return Episode(row, traces_of(stride * period, seen, _part(inside, kept)) | poses.traces())
 
 
@@ -119,6 +122,11 @@ class _Poses:
 def diagnosed_every(plant: Any, stride: int) -> int:
     """Return the number of control periods between two diagnostics of a policy, for metrics and traces of a stride."""
     return 1 if plant.metrics_spec.diagnosed else stride
+
+
+def told_every(plant: Any, stride: int) -> int:
+    """Return the number of control periods between two records of `info`, for metrics and traces."""
+    return 1 if plant.metrics_spec.watched else stride
 
 
 def metrics_for(plant: Any, disturbances: Sequence[Mapping[str, Any]], phases: Sequence[Span]) -> Metrics:

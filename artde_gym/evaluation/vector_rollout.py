@@ -68,10 +68,13 @@ def run_vector(
     traces = _Traces(env, record_episodes, stride)
     traces.observe(0, observation, info)
     block: list[Array] = []
+    told: list[dict[str, Array]] = []
+    names = env.metrics_spec.recorded_info if env.metrics_spec.watched else ()
     insides: list[dict[str, Array]] = []
     state, episode_start, k = None, live, 0
     while live.any():
         block.append(np.array(observation))
+        told.append({name: np.array(info[name]) for name in names})
         action, state = policy.predict(observation, state=state, episode_start=episode_start, deterministic=True)
         if diagnose is not None and k % looks == 0:
             insides.append(copied(diagnose(state)))
@@ -83,10 +86,11 @@ def run_vector(
         episode_start = terminated | truncated
         ended = live & episode_start
         if ended.any() or len(block) * len(seeds) >= BLOCK:
-            metrics.add(k - len(block), split(np.array(block)), stack(insides), live)
-            block, insides = [], []
+            metrics.add(k - len(block), split(np.array(block)) | stack(told), stack(insides), live)
+            block, told, insides = [], [], []
         if ended.any():
-            metrics.add(k, split(observation[None]), None, ended)  # no decision follows the last observation
+            last = {name: np.array(info[name])[None] for name in names}
+            metrics.add(k, split(observation[None]) | last, None, ended)  # no decision follows the last observation
             steps[ended] = k
             reasons |= {int(i): fall_reason(info, int(i)) for i in np.flatnonzero(live & terminated)}
             live = live & ~ended

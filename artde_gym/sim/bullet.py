@@ -369,12 +369,12 @@ class BulletEngine:
             bullet.removeBody(self._payload, physicsClientId=self._client)
             self._payload = None
 
-    def render(self, camera: Camera) -> NDArray[np.uint8]:
+    def render(self, camera: Camera, load: Vector | None = None) -> NDArray[np.uint8]:
         view = bullet.computeViewMatrixFromYawPitchRoll(
             camera.target, camera.distance, camera.yaw_deg, -camera.pitch_deg, 0.0, 2
         )
         lens = bullet.computeProjectionMatrixFOV(FIELD_OF_VIEW, camera.width / camera.height, NEAR, FAR_PLANE)
-        payload, ball = self.payload_position(), None
+        payload, ball = self.payload_position() if load is None else load, None
         if payload is not None:  # only now: reading the mesh of its ball takes longer than a reset
             ball = bullet.createMultiBody(0.0, -1, self._ball, payload, physicsClientId=self._client)
         _, _, rgba, _, body = bullet.getCameraImage(

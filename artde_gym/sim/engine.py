@@ -171,10 +171,10 @@ class Engine(World, Protocol):
         """Return the total force of the ground on each foot in the last step, (feet, 3) (N, world axes)."""
         ...
 
-    def render(self, camera: Camera) -> NDArray[np.uint8]:
+    def render(self, camera: Camera, load: Vector | None = None) -> NDArray[np.uint8]:
         """Render an image (height, width, 3) of robot and payload on the ground of `artde_gym.sim.ground`.
 
-        This does not change the state.
+        This does not change the state. `load` (m) replaces the engine's own payload, for one on a cable.
 
         Raises:
             OptionError: if the engine cannot render on this machine.

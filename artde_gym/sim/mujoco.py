@@ -169,11 +169,11 @@ class MujocoEngine(MujocoWorld):
             return x, y, z
         return None
 
-    def render(self, camera: Camera) -> NDArray[np.uint8]:
+    def render(self, camera: Camera, load: Vector | None = None) -> NDArray[np.uint8]:
         if self._canvas is None:
             self._canvas = Canvas(self._model)
         mj.mj_camlight(self._model, self.placed())
-        ball = self.payload_position()
+        ball = self.payload_position() if load is None else load
         picture, bare = self._canvas.draw(self._data, camera, ball)
         paint(picture, bare, camera, self._shadow.polygons(self.state(), ball))
         return picture

@@ -18,7 +18,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import DTypeLike
+from numpy.typing import DTypeLike, NDArray
 
 from artde_gym.arrays import Array, total
 from artde_gym.multibody.dynamics import GRAVITY
@@ -89,6 +89,20 @@ class RigidBodies:
         self.rates[:, body] = self.com_velocity[:, body] = self._acceleration[:, body] = 0.0
         self.com[:, body] = np.add(origin, self._arm[:, body])
 
+    @property
+    def arm(self) -> Array:
+        """Centers of mass in the bodies' frames (3, n) (m)."""
+        return self._arm
+
+    @property
+    def inverse_mass(self) -> Array:
+        """Of each body (n,) (1/kg)."""
+        return self._inverse_mass
+
+    def principal_inverse_inertia(self) -> Array:
+        """Diagonals of the inverse inertias (3, n) (1/(kg m^2))."""
+        return self._inverse_inertia.reshape(9, -1)[::4]
+
     def motion(self) -> tuple[Array, ...]:
         """Return the arrays that a step changes, bodies on the last axis."""
         return self.com, self.com_velocity, self.quat_xyzw, self.rot, self.rates, self._acceleration
@@ -126,6 +140,15 @@ class RigidBodies:
         about_com -= cross(middle, times(self._inertia, middle))
         self._acceleration = times(self._inverse_inertia, about_com)
         self.rates += duration * self._acceleration
+
+    def add_kick(self, duration: float, acceleration: Array, turning: Array, where: NDArray[np.bool_]) -> None:
+        """Make the last kick stronger by an `acceleration` (m/s^2, world axes) and a `turning` (rad/s^2, body axes).
+
+        Both are (3, n); bodies other than those `where` keep their velocities to the bit.
+        """
+        np.add(self.com_velocity, duration * acceleration, out=self.com_velocity, where=where)
+        np.add(self.rates, duration * turning, out=self.rates, where=where)
+        np.add(self._acceleration, turning, out=self._acceleration, where=where)
 
     def _update_rot(self) -> None:
         x, y, z, w = self.quat_xyzw

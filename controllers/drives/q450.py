@@ -10,7 +10,7 @@ from controllers.design import preset_designs
 from controllers.drive import Drive
 from controllers.loop import Loop
 from controllers.presets.q450 import Q450, Q450_RANGES
-from controllers.quadrotor import make_quadrotor
+from controllers.slung import make_quadrotor_or_slung
 from controllers.stability_check import REMEDY, judged
 
 
@@ -37,4 +37,4 @@ def _judged(loop: Loop, tuned: bool) -> CheckResult:
     return CheckResult(what, status, found, remedy)
 
 
-DRIVE = Drive("q450", Q450, Q450_RANGES, make_quadrotor, period=0.015, loops=loops, stability=stability)
+DRIVE = Drive("q450", Q450, Q450_RANGES, make_quadrotor_or_slung, period=0.015, loops=loops, stability=stability)

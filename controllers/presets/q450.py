@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 from artde_gym.multibody.dynamics import GRAVITY
@@ -12,6 +13,7 @@ from controllers.laws.asmc import AsmcGains
 from controllers.laws.atde import AtdeGains
 from controllers.laws.cascade import CascadeGains
 from controllers.laws.indi import IndiGains
+from controllers.laws.load import LoadGains
 from controllers.laws.positional_pid import PositionalPidGains
 from controllers.laws.rigid_attitude import RigidAttitudeGains
 from controllers.laws.tde import ConstantGains, TdeGains
@@ -63,6 +65,23 @@ _TUNED = (
     "ours: `artde-gym tune --scenario Q1 --trials 60 --episodes 8 --held-out 100 --seed 0 --vectorized`, as for "
     "every law; best there, and nearer to instability than the default"
 )
+
+_SLUNG_M_BAR = 1.6  # kg, nearer to the mass of vehicle and load together
+_SLUNG = f"{_THESIS}; m_bar of the position is {_SLUNG_M_BAR:g}, ours, for the mass with a load"
+
+
+def _swing(law: Any, **rest: Any) -> tuple[Preset, Preset]:
+    """Return the thesis' gains with the swing term's m_bar of the position."""
+    thesis = _both(law, **rest)
+    slung = dataclasses.replace(thesis, position=dataclasses.replace(thesis.position, m_bar=_SLUNG_M_BAR))
+    return Preset(thesis, _THESIS), Preset(slung, _SLUNG)
+
+
+_LAWS_WITH_SWING = {
+    "tde+swing": _swing(TdeGains),
+    "atde+swing": _swing(AtdeGains, **_ADAPTIVE, gamma_0=_GAMMA, c_floor=_FLOOR, c_start=_FLOOR),
+    "artde+swing": _swing(ArtdeGains, **_ARTDE),
+}
 
 Q450: dict[tuple[str, str], Preset] = {
     ("tde", "thesis"): Preset(_both(TdeGains), _THESIS),
@@ -125,6 +144,26 @@ Q450: dict[tuple[str, str], Preset] = {
         ),
         _TUNED,
     ),
+    **{(law, "thesis"): thesis for law, (thesis, _) in _LAWS_WITH_SWING.items()},
+    **{(law, "slung"): slung for law, (_, slung) in _LAWS_WITH_SWING.items()},
+    ("geometric-load", "hand"): Preset(
+        _cascade(
+            LoadGains(
+                _MASS,
+                10.0,
+                5.0,
+                k_i=5.0,
+                integral_limit=20.0,
+                load_mass=0.35,
+                vehicle_mass=_MASS,
+                load_k_p=_K_P,
+                load_k_d=_K_D,
+                load_k_i=0.5,
+            ),
+            TdeGains(_J_BAR, _K_P, _K_D),
+        ),
+        "ours, by hand: the load's poles are those of tde+swing; attitude as there, position without a load as in pid",
+    ),
     ("indi", "hand"): Preset(
         _cascade(
             IndiGains(_MASS, 10.0, 5.0, filter_rate=50.0, filter_damping=0.55),
@@ -170,6 +209,15 @@ Q450_RANGES: dict[str, Ranges] = {
     "tde+c": {**_DELAYED, "c_p": (0.01, 10.0), "c_q": (0.01, 10.0)},
     "pid": {**_FEEDBACK, **_INTEGRAL},
     "geometric": {**_FEEDBACK, "k_i_p": _INTEGRAL["k_i_p"]},
+    "tde+swing": _DELAYED,
+    "atde+swing": {**_DELAYED, **_ROBUST, **_GROWTH},
+    "artde+swing": {**_DELAYED, **_ROBUST, **_GROWTH, "gamma_1_p": (0.05, 50.0), "gamma_1_q": (0.05, 50.0)},
+    "geometric-load": {
+        "load_k_p_p": _FEEDBACK["k_p_p"],
+        "load_k_d_p": _FEEDBACK["k_d_p"],
+        "load_k_i_p": (0.05, 6.0),
+        **{name: _DELAYED[name] for name in ("k_p_q", "k_d_q", "m_bar_q")},
+    },
     "indi": {**_FEEDBACK, "m_bar_p": (0.5, 2.5), "filter_rate_p": (10.0, 200.0), "filter_rate_q": (10.0, 200.0)},
     "asmc": {
         **{f"slope_{loop}": (0.3, 20.0) for loop in "pq"},

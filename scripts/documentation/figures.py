@@ -28,6 +28,7 @@ from controllers.laws.tracking import JointInput, components
 from controllers.laws.vectors import joined
 from documentation.architecture import rooms
 from documentation.plant import ARM, DURATION, LIFT, LOADED, PUSHED, Plant, Run, modeled, simulate
+from documentation.sling import swing
 
 ARM_PERIOD, LIFT_PERIOD = 0.004, 0.015  # s
 NOISE = 0.02  # m/s, of a measured velocity
@@ -224,6 +225,7 @@ FIGURES: dict[str, Callable[[], str]] = {
     "indi": indi,
     "computed-torque": computed,
     "geometric": geometric,
+    "swing": swing,
 }
 """Name on a page -> the figure as HTML."""
 

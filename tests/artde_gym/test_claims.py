@@ -27,6 +27,8 @@ from artde_gym.studies.reproduce.claims import (
     ordered,
     register_claims,
     repeats,
+    safer,
+    settles,
 )
 
 
@@ -223,3 +225,23 @@ def test_claims_of_ones_own_are_judged_with_the_others(monkeypatch: pytest.Monke
     assert judge(result).iloc[-1][["claim", "verdict"]].tolist() == ["TDE never falls", "holds"]
     with pytest.raises(OptionError, match="mine"):
         register_claims("mine", [])
+
+
+def test_claims_of_falls_and_of_settling() -> None:
+    time = "recovery_time_s_push0_swing"
+    rows = [
+        {"scenario": "Q-sling", "controller": name, "episode": i, "seed": i, "fell": fell,
+         "fall_reason": "load" if fell else "", time: settled}
+        for name, falls, settled in (("a", 0, 2.0), ("b", 12, np.inf), ("c", 1, np.nan))
+        for i, fell in enumerate([True] * falls + [False] * (20 - falls))
+    ]  # fmt: skip
+    result = Result(pd.DataFrame(rows))
+    assert safer("Q-sling", "a", ["b"])(result).outcome == "holds"
+    assert safer("Q-sling", "a", ["b", "c"])(result).outcome == "undecided"
+    assert safer("Q-sling", "b", ["c"])(result).outcome == "does not hold"
+    assert safer("Q-sling", "a", ["d"])(result).outcome == "not measured"
+    assert settles("Q-sling", time, {"a": True, "b": False})(result).outcome == "holds"
+    assert settles("Q-sling", time, {"b": True})(result).outcome == "does not hold"
+    assert settles("Q-sling", time, {"c": True})(result).outcome == "not measured"  # nobody knows
+    assert settles("Q-sling", "recovery", {"a": True})(result).outcome == "not measured"
+    assert "a 20/20" in settles("Q-sling", time, {"a": True})(result).measured

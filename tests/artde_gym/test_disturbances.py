@@ -318,7 +318,9 @@ def test_refusals_say_what_was_likely_meant():
 @pytest.mark.parametrize("kind", DISTURBANCES.values(), ids=list(DISTURBANCES))
 def test_a_robot_refuses_the_kinds_that_it_cannot_honour(robot, kind):
     example = {
-        p.name: words(p)[0] if p.size == 0 else [p.low] * p.size if p.size > 1 else p.low for p in complete(kind)
+        p.name: words(p)[0] if p.size == 0 else [p.low] * p.size if p.size > 1 else p.low
+        for p in complete(kind)
+        if p in kind.parameters_for(robot)
     }
     given_ = {kind.name: example}
     if kind.honored_by(robot):
@@ -338,7 +340,7 @@ def test_each_robot_has_its_kinds_and_defaults():
     assert {"friction", "slope", "grf_pulse", "encoder_bits", "initial_pose"} <= {
         kind.name for kind in DISTURBANCES.values() if kind.honored_by("ojas") and not kind.honored_by("q450")
     }
-    assert {"wind", "ground_effect", "initial_position"} == {
+    assert {"wind", "ground_effect", "initial_position", "cable_delay"} == {
         kind.name for kind in DISTURBANCES.values() if kind.honored_by("q450") and not kind.honored_by("ojas")
     }
     push = {"magnitude": 1, "start": 0}

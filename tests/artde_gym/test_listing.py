@@ -47,7 +47,7 @@ def test_json_holds_the_gains_that_a_controller_has() -> None:
     """Every preset, built for the robot, has the very gains that are listed."""
     envs: dict[str, Any] = {
         "ojas": gym.make("BipedWalk-Payload-v0", disable_env_checker=True, duration=0.2),
-        "q450": gym.make("QuadInfinity-Payload-v0", disable_env_checker=True, duration=0.2),
+        "q450": gym.make("QuadSling-Payload-v0", disable_env_checker=True, duration=0.2),  # some laws need its cable
     }
     found = json.loads(listing("controllers", "--json"))
     assert [entry["name"] for entry in found] == list(registered_controllers())

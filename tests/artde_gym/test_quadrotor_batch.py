@@ -136,7 +136,7 @@ def test_float32_flies_nearly_the_same(pilot: Pilot) -> None:
     np.testing.assert_allclose(b[:, :3], a[:, :3], rtol=0, atol=1e-4)
     for _, fleet in half._fleets:
         arrays = [value for value in {**vars(fleet), **vars(fleet.bodies)}.values() if isinstance(value, np.ndarray)]
-        assert all(array.dtype in (np.float32, np.int64, np.uint64) for array in arrays)
+        assert all(array.dtype in (np.float32, np.int64, np.uint64, np.bool_) for array in arrays)
 
 
 def test_observations_are_new_arrays_with_contiguous_components() -> None:

@@ -22,6 +22,8 @@ from artde_gym.arrays import Array
 START = (0.0, 0.0, 0.6)  # m
 LOOPS = ((0.0, 33.0), (37.0, 70.0))  # s
 RAMP = 4.0  # s
+LIFT = 1.0  # m, by which the path is raised where a load hangs under the vehicle
+LIFTED_FAN = (0.9, 0.0, 1.7)  # m, a fan beside the raised path, as the default is beside the low one
 MAX_DURATION = 7200.0  # s
 
 _AMPLITUDE = np.array([1.2, 0.6, 0.2])

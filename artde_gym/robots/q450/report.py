@@ -19,6 +19,12 @@ PLANES = {"XZ": (0, 2), "YZ": (1, 2), "XY": (0, 1)}
 WIDTH = 400
 AZIMUTH, ELEVATION = math.radians(-60.0), math.radians(28.0)  # rad, of the camera
 GRID = 0.5  # m, spacing of the floor's grid
+LOAD = {
+    "swing": ("swing (deg)", 180.0 / math.pi),
+    "load_error": ("load's error (mm)", 1e3),
+    "cable_impulse": ("cable's impulse in a control period (Ns)", 1.0),
+}
+"""Signal -> title of its chart, and factor."""
 SAMPLE_STRIDE = 4  # stored samples per drawn point: a path needs fewer than a signal
 
 
@@ -70,6 +76,27 @@ def figures(episode: Episode) -> list[str]:
         chart.reference(wanted[:, i], wanted[:, j])
         charts[f"{plane} plane"] = chart.svg()
     caption = f"The infinity path, episode {episode.number} (seed {episode.seed}); dashed: the reference. Equal scales."
+    return [figure(caption, charts, shown), *_load(episode)]
+
+
+def _load(episode: Episode) -> list[str]:
+    """Swing, error and impulses of a load on a cable, where there is one."""
+    shown = styles(episode.signals)
+    charts: dict[str, str] = {}
+    for field, (title, scale) in LOAD.items():
+        lines = {
+            name: (signals.time, scale * signals.fields[field].ravel())
+            for name, signals in episode.signals.items()
+            if field in signals.fields
+        }
+        if not lines:
+            return []
+        x = Axis.of("time (s)", *(time for time, _ in lines.values()))
+        chart = Chart(f"{title} over time", x, Axis.of(title, *(values for _, values in lines.values()), zero=True))
+        for name, (time, values) in lines.items():
+            chart.line(time, values, shown[name], text=name)
+        charts[title.rpartition(" (")[0]] = chart.svg()
+    caption = f"The load on the cable, episode {episode.number} (seed {episode.seed}); zero while nothing hangs."
     return [figure(caption, charts, shown)]
 
 

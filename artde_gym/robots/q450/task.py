@@ -14,6 +14,7 @@ from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.ground_effect import thrust_gain
 from artde_gym.disturbances.numeric import Words
 from artde_gym.disturbances.wind import GRID
+from artde_gym.kit import PAYLOAD
 from artde_gym.layout import Field, Layout
 from artde_gym.metrics_spec import EffortSignal, Fields, MetricsSpec, TrackedSignal
 from artde_gym.multibody.dynamics import GRAVITY
@@ -115,7 +116,12 @@ METRICS_SPEC = MetricsSpec(
 )
 """Position and attitude, as in table 3.1 of the thesis; an error of 2 cm counts as recovered."""
 
-DOCUMENTATION = f"""\
+
+def documentation(
+    observation: Layout, *, reference: str, terms: str, perfect: float, end: str, disturbances: str
+) -> str:
+    """Write what the pages of an environment and of its vector share; their own arguments follow."""
+    return f"""\
 ## Action
 `wrench`, four numbers: thrust u1 (N) along the body's z axis, and torques u2, u3, u4 (Nm) about its x, y and z axes:
 
@@ -126,14 +132,13 @@ the four rotors, each of which is limited to 0 to {robot.MAX_THRUST:g} N and fol
 of {robot.ROTOR_LAG:g} s. Use Gymnasium's `RescaleAction` for [-1, 1].
 
 ## Observation
-{OBSERVATION.table()}
+{observation.table()}
 
 `wrench_applied` is the wrench that acted, after limits, lag and losses of rotors, but without ground effect, as needed
 by the time-delay estimate. Policies do not observe payload, wind, pushes and ground effect.
 
 ## Reference
-The infinity-shaped path of `artde_gym.robots.q450.infinity`: loop 1 until 33 s, rest until 37 s, loop 2 until 70 s;
-yaw 0.
+{reference}
 
 ## Reward
 For a control period L, L times the sum of scale x term; `info` has each term (`reward_alive`, ...):
@@ -145,9 +150,9 @@ For a control period L, L times the sum of scale x term; `info` has each term (`
 | `velocity` | 0.5 | exp(-\\|e\\|^2 / 0.05), e = velocity_ref - velocity in m/s |
 | `upright` | 0.5 | cosine of the tilt |
 | `effort` | -0.05 | mean of (rotor thrust / 8.5 N)^2 |
-| `smoothness` | -0.05 | mean of (change of rotor thrust / 8.5 N)^2 |
+| `smoothness` | -0.05 | mean of (change of rotor thrust / 8.5 N)^2 |{terms}
 
-A flight of 70 s without an error earns a little under 280.
+A flight of 70 s without an error earns a little under {perfect:g}.
 
 ## Start
 At rest and level at the path's start, in equilibrium with the payload and with steady-state thrusts.
@@ -155,7 +160,7 @@ At rest and level at the path's start, in equilibrium with the payload and with 
 ## End
 *Terminated* by a crash, with the reason in `info`: `fell_ground` (the vehicle's origin below {GROUND_HEIGHT:g} m),
 `fell_inverted` (tilt above 90 degrees) or `fell_bounds` (x or y beyond {FLIGHT_BOUND:g} m, z above {FLIGHT_BOUND:g} m,
-or body rates with a norm above {MAX_SPIN:g} rad/s). *Truncated* after `duration`.
+or body rates with a norm above {MAX_SPIN:g} rad/s).{end} *Truncated* after `duration`.
 
 ## Physics
 Vehicle of {robot.MASS:g} kg with linear drag of {robot.DRAG:g} N s/m against the air; see `artde_gym.robots.q450`. Wind
@@ -165,11 +170,22 @@ in body axes in between.
 ## Arguments
 | name | default | allowed | meaning |
 |---|---|---|---|
-| `disturbances` | payload of 0.35 kg until 35 s, wind, ground effect | see `artde_gym.disturbances` | disturbances; \
-`{{}}` for none |
+| `disturbances` | {disturbances} | see `artde_gym.disturbances` | disturbances; `{{}}` for none |
 | `control_period` | 0.015 | whole multiples of {GRID:g} s up to 0.05 | control period L |
 | `measurement` | "ideal" | "ideal", "mocap" | the true state, or its estimate by `artde_gym.disturbances.mocap` |
 | `duration` | 70.0 | 0.1 to 7200 s | duration of the flight |"""
+
+
+DOCUMENTATION = documentation(
+    OBSERVATION,
+    reference="""\
+The infinity-shaped path of `artde_gym.robots.q450.infinity`: loop 1 until 33 s, rest until 37 s, loop 2 until 70 s;
+yaw 0.""",
+    terms="",
+    perfect=280,
+    end="",
+    disturbances="payload of 0.35 kg until 35 s, wind, ground effect",
+)
 """Text of the pages of both environments; further arguments follow."""
 
 REWARD_SCALES: dict[str, float] = {
@@ -182,7 +198,7 @@ REWARD_SCALES: dict[str, float] = {
 }
 """The reward of a control period L is L times the sum of these scales times their terms."""
 FALL_REASONS = ("ground", "inverted", "bounds")
-WORDS: Words = {"site": tuple(name for name, _, _ in robot.q450().sites), "joint": robot.ROTORS}
+WORDS: Words = {"site": (*(name for name, _, _ in robot.q450().sites), PAYLOAD), "joint": robot.ROTORS}
 
 Number = TypeVar("Number", float, Array)
 Vector3 = tuple[Number, Number, Number]
@@ -224,21 +240,23 @@ def parse(disturbances: Mapping[str, Any]) -> Disturbances:
     return Disturbances.parse(disturbances, WORDS["site"], WORDS["joint"], robot.q450().name)
 
 
-def plan(duration: float, period: float) -> Array:
-    """Return the references in the observation, one row per control period: (samples, 15)."""
+def plan(duration: float, period: float, lift: float = 0.0) -> Array:
+    """Return the references of the path, raised by `lift` (m), one row per control period: (samples, 15)."""
     path = infinity_path(duration, period)
     phase = path.period * np.arange(len(path.yaw)) / duration
     columns = (path.yaw, path.yaw_rate, phase)
-    return np.column_stack([path.position, path.velocity, path.acceleration, path.jerk, *columns])
+    return np.column_stack(
+        [np.add(path.position, (0.0, 0.0, lift)), path.velocity, path.acceleration, path.jerk, *columns]
+    )
 
 
-def start(sampled: Mapping[str, Any]) -> Vector:
-    """Return the vehicle's position at the start (m)."""
+def start(sampled: Mapping[str, Any], lift: float = 0.0) -> Vector:
+    """Return the vehicle's position at the start (m) of a path that is raised by `lift` (m)."""
     x, y, z = map(operator.add, START, sampled.get("initial_position", {}).get("offset", (0.0, 0.0, 0.0)))
-    return x, y, z
+    return x, y, z + lift
 
 
-def hover_thrusts(sampled: Mapping[str, Any]) -> list[float]:
+def hover_thrusts(sampled: Mapping[str, Any], lift: float = 0.0) -> list[float]:
     """Return rotor thrusts (N) that balance the level vehicle and its payload at the start, within their limits."""
     mass = robot.MASS * sampled.get("mass_scale", {}).get("factor", 1.0)
     payload = sampled.get("payload")
@@ -249,7 +267,7 @@ def hover_thrusts(sampled: Mapping[str, Any]) -> list[float]:
         moment_x, moment_y = payload["mass"] * GRAVITY * y, -payload["mass"] * GRAVITY * x
     gain = 1.0
     if "ground_effect" in sampled:
-        gain = thrust_gain(start(sampled)[2], robot.ROTOR_RADIUS, sampled["ground_effect"]["strength"], max)
+        gain = thrust_gain(start(sampled, lift)[2], robot.ROTOR_RADIUS, sampled["ground_effect"]["strength"], max)
     balance = robot.thrusts(mass * GRAVITY, moment_x, moment_y, 0.0)
     return [min(max(thrust / gain, 0.0), robot.MAX_THRUST) for thrust in balance]
 

@@ -132,7 +132,7 @@ def _find(env_id: str, path: str) -> tuple[str | None, str, str]:
         f"{kind.name}.{parameter.name}": (kind.name, parameter.name, parameter.unit)
         for kind in DISTURBANCES.values()
         if kind.honored_by(robot)
-        for parameter in kind.parameters
+        for parameter in kind.parameters_for(robot)
         if parameter.size == 1
     }
     numbers = [

@@ -13,8 +13,10 @@ from artde_gym.scenarios import scenario as find_scenario
 
 
 def standard_for(env_id: str) -> FrontierTest | None:
-    """Return the standard test of an environment's robot, or None."""
-    return ROBOTS[robot_of(env_id)].frontier
+    """Return the standard test of an environment, or of its robot, or None."""
+    kit = ROBOTS[robot_of(env_id)]
+    own = (entry.frontier for entry in kit.environments if entry.env_id == env_id)
+    return next(own, None) or kit.frontier
 
 
 def standard_test(

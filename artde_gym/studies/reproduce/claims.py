@@ -156,6 +156,49 @@ def adapts(scenario: str, rival: str, metric: str) -> Callable[[Result], Verdict
     return judge
 
 
+def safer(scenario: str, name: str, rivals: Sequence[str]) -> Callable[[Result], Verdict]:
+    """Judge whether a controller falls less often than each of its rivals."""
+
+    def judge(result: Result) -> Verdict:
+        if missing := _missing(result, scenario, (name, *rivals)):
+            return missing
+        count, rate = result.falls(scenario, name)
+        others = {rival: result.falls(scenario, rival) for rival in rivals}
+        measured = (
+            f"{name} {count}/{rate.n}, " + ", ".join(f"{r} {n}/{of.n}" for r, (n, of) in others.items()) + " fell"
+        )
+        if all(rate.high < of.low for _, of in others.values()):
+            return Verdict("holds", measured)
+        wrong = any(rate.low > of.high for _, of in others.values())
+        return Verdict("does not hold" if wrong else "undecided", measured)
+
+    return judge
+
+
+def settles(scenario: str, time: str, expected: Mapping[str, bool]) -> Callable[[Result], Verdict]:
+    """Judge whether a controller's settling times are finite (True) or infinite (False) more often than not."""
+
+    def judge(result: Result) -> Verdict:
+        if missing := _missing(result, scenario, tuple(expected)):
+            return missing
+        if time not in result.episodes:
+            return Verdict("not measured", f"no column {time}")
+        rates: dict[str, Estimate] = {}
+        for name in expected:
+            known = _upright(result, scenario, name)[time].dropna().to_numpy(np.float64)
+            rates[name] = statistics.rate(int(np.isfinite(known).sum()), len(known))
+        if any(rate.n == 0 for rate in rates.values()):
+            return _nothing(result, scenario, tuple(expected))
+        measured = ", ".join(f"{name} {rate.value * rate.n:.0f}/{rate.n}" for name, rate in rates.items()) + " settled"
+        agree = [rate.low > 0.5 if expected[name] else rate.high < 0.5 for name, rate in rates.items()]
+        differ = [rate.high < 0.5 if expected[name] else rate.low > 0.5 for name, rate in rates.items()]
+        if all(agree):
+            return Verdict("holds", measured)
+        return Verdict("does not hold" if any(differ) else "undecided", measured)
+
+    return judge
+
+
 def ordered(scenario: str, names: Sequence[str], metric: str) -> Callable[[Result], Verdict]:
     """Claim that the metric's mean grows from each controller to the next."""
 

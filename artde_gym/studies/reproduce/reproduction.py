@@ -75,7 +75,7 @@ def scenarios_of(robot: str, names: Sequence[str] | None = None) -> tuple[str, .
         UnknownNameError: for an unknown robot or scenario.
     """
     own, _ = kit_of(robot).reproduced
-    environments = {find_scenario(name).env_id for name in own}
+    environments = {entry.env_id for entry in kit_of(robot).environments}
     return own if names is None else tuple(name for name in names if find_scenario(name).env_id in environments)
 
 

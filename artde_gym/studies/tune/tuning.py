@@ -1,10 +1,11 @@
 """Tuning: the same number of trials for every controller on training seeds, judged on held-out seeds.
 
 A trial is one set of gains, run in the same seeded episodes for all controllers. Its cost is the episodes' mean of the
-environment's main tracking error (`rmse_m`, `rmse_deg`), where a fall after t seconds counts `FALL` (1 + 1 / (1 + t)),
-more than any error. Trial 0 is the controller's own preset; the others are proposed by Optuna's tree-structured Parzen
-estimator (Bergstra et al. 2011) within the controller's registered ranges. The gains with the smallest cost are then
-compared with the preset on held-out seeds, which removes any gain from overfitting the training seeds.
+environment's main tracking error (`rmse_m`, `rmse_deg`), or of another column of the table of episodes, where a fall
+after t seconds counts `FALL` (1 + 1 / (1 + t)), more than any error. Trial 0 is the controller's own preset; the others
+are proposed by Optuna's tree-structured Parzen estimator (Bergstra et al. 2011) within the controller's registered
+ranges. The gains with the smallest cost are then compared with the preset on held-out seeds, which removes any gain
+from overfitting the training seeds.
 
 A proposal depends only on the seed, the controller and its finished trials: results are the same for any number of
 processes, and for a resumed run.
@@ -83,6 +84,7 @@ def tune(
     episodes: int = 4,
     held_out: int = 20,
     seed: int = 0,
+    metric: str | None = None,
     workers: int = 1,
     out: str | Path | None = None,
     disturbances: Mapping[str, Any] | None = None,
@@ -100,6 +102,7 @@ def tune(
         trials: number per controller, the preset included.
         episodes: number per trial.
         held_out: number of episodes of the comparison.
+        metric: column of `episodes.csv` to minimize; None for the environment's first error.
         seed: base seed of the proposals and training episodes; the comparison's episodes have those of seed + 1.
         out: results folder; repeat the call to resume.
         on_progress: called with the running part ("trial 3 of 50", "held-out") and the progress of its episodes.
@@ -124,7 +127,7 @@ def tune(
         allow_mixed=allow_mixed,
     )
     env_id = plan.cells[0].env_id
-    search = _Search(plan, on_progress)
+    search = _Search(plan, metric, on_progress)
     configuration = {
         "env": env_id,
         "scenario": scenario,
@@ -136,6 +139,7 @@ def tune(
         "episodes": episodes,
         "held_out": held_out,
         "seed": seed,
+        **({} if metric is None else {"metric": metric}),
     }
     store = None if out is None else TuningStore(Path(out), configuration, _behind(names, env_id), allow_mixed)
     return search.run(trials, held_out, store)
@@ -161,11 +165,11 @@ def _one_scenario(scenario: Any) -> str | None:
 class _Search:
     """The trials of all controllers, and the final comparison."""
 
-    def __init__(self, plan: Plan, on_progress: Callable[[str, Update], None] | None) -> None:
+    def __init__(self, plan: Plan, metric: str | None, on_progress: Callable[[str, Update], None] | None) -> None:
         env_id = plan.cells[0].env_id
         self._plan, self._on_progress = plan, on_progress
         self._proposer = Proposer(plan.seed)
-        self.metric = f"rmse_{metrics_spec_of(env_id).errors[0].unit}"
+        self.metric = f"rmse_{metrics_spec_of(env_id).errors[0].unit}" if metric is None else metric
         self.spaces = {name: tuning_space(name, single(env_id, json.dumps({}))) for name in plan.controllers}
 
     def run(self, trials: int, held_out: int, store: TuningStore | None) -> Tuning:

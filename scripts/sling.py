@@ -1,0 +1,164 @@
+"""The flights with a load on a cable behind docs/results.md: laws over masses, cables and seeds, all in one vector.
+
+python scripts/sling.py known      0.1, 0.35, 0.5 kg on 0.3, 0.5, 1.0 m
+python scripts/sling.py held-out   0.2, 0.45, 0.6 kg on 0.4, 0.75, 1.2 m: nothing was chosen by these
+python scripts/sling.py late       known, the cable measured 60 ms late
+
+Each flight is that of scenario Q-sling but for mass and cable: wind, a kick of 0.8 m/s on the load at 20 s, its release
+at 35 s, the end at 45 s. A law that takes the load's mass is told it.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pandas as pd
+
+import controllers
+from artde_gym.evaluation import statistics
+from artde_gym.evaluation.seeds import episode_seed
+from artde_gym.evaluation.vector_rollout import run_vector
+from artde_gym.robots.q450.kit import kick
+from artde_gym.scenarios import SCENARIOS
+
+KNOWN = ((0.1, 0.35, 0.5), (0.3, 0.5, 1.0))  # kg, m
+HELD_OUT = ((0.2, 0.45, 0.6), (0.4, 0.75, 1.2))
+FIGURES: dict[str, tuple[Any, Mapping[str, Any]]] = {
+    "known": (KNOWN, {}),
+    "held-out": (HELD_OUT, {}),
+    "late": (KNOWN, {"cable_delay": {"steps": 4}}),
+}
+LAWS: dict[str, tuple[str, dict[str, Any]]] = {
+    "TDE, thesis": ("tde", {}),
+    "ATDE, thesis": ("atde", {}),
+    "ARTDE, thesis": ("artde", {}),
+    "TDE, tuned": ("tde", {"preset": "tuned"}),
+    "geometric, tuned": ("geometric", {"preset": "tuned"}),
+    "TDE + swing": ("tde+swing", {}),
+    "ATDE + swing": ("atde+swing", {}),
+    "ARTDE + swing": ("artde+swing", {}),
+    "TDE + swing, m_bar 1.6": ("tde+swing", {"preset": "slung"}),
+    "geometric, of the load": ("geometric-load", {}),
+}
+COLUMNS = {
+    "rmse_m": ("vehicle mm", 1e3, 1),
+    "rms_load_error_m": ("load mm", 1e3, 1),
+    "rms_swing_deg": ("swing deg", 1.0, 2),
+    "peak_swing_deg_push0": ("after kick deg", 1.0, 1),
+    "max_cable_impulse_ns": ("impulse Ns", 1.0, 3),
+    "peak_error_m_drop": ("after release mm", 1e3, 0),
+}
+SETTLED = "recovery_time_s_push0_swing"
+
+
+class Grid:
+    """A vector environment whose parts have disturbances of their own.
+
+    Args:
+        parts: (disturbances, number of environments) each.
+    """
+
+    def __init__(self, parts: Sequence[tuple[Mapping[str, Any], int]]) -> None:
+        self._parts, self.num_envs = parts, sum(count for _, count in parts)
+        made = gym.make_vec(
+            "QuadSling-Payload-v0", self.num_envs, "vector_entry_point", engine="numpy", duration=45.0,
+            disturbances={}, autoreset_mode="Disabled",
+        )  # fmt: skip
+        self.unwrapped: Any = made.unwrapped
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.unwrapped, name)
+
+    def reset(self, *, seed: Sequence[int]) -> tuple[Any, Any]:
+        """Start all flights, part by part."""
+        found = self.unwrapped.reset(seed=list(seed))
+        first = 0
+        for disturbances, count in self._parts:
+            mask = np.zeros(self.num_envs, np.bool_)
+            mask[first : first + count] = True
+            options = {"disturbances": disturbances, "reset_mask": mask}
+            found = self.unwrapped.reset(seed=list(seed), options=options)
+            first += count
+        return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("figure", choices=FIGURES)
+    parser.add_argument("--seeds", type=int, default=8, help="of each mass and cable")
+    parser.add_argument("--seed", type=int, default=0, help="from which those are derived")
+    parser.add_argument("--laws", nargs="+", default=list(LAWS))
+    options = parser.parse_args()
+    (masses, cables), more = FIGURES[options.figure]
+    cells = [(mass, cable) for mass in masses for cable in cables]
+    found = flights(options.laws, cells, options.seeds, options.seed, more)
+    print("| law | flown | " + " | ".join(title for title, _, _ in COLUMNS.values()) + " | settled | settles s |")
+    print("|---|" + "---|" * (len(COLUMNS) + 3))
+    for number, label in enumerate(options.laws):
+        size = len(cells) * options.seeds
+        print(row(label, found.iloc[number * size : (number + 1) * size]))
+
+
+def flights(
+    labels: Sequence[str], cells: Sequence[tuple[float, float]], seeds: int, seed: int, more: Mapping[str, Any]
+) -> pd.DataFrame:
+    """One row a flight: law by law, mass and cable by mass and cable, all in one vector."""
+    env = Grid([({**scenario(mass, cable), **more}, seeds) for _ in labels for mass, cable in cells])
+    numbers = [episode_seed(seed, number) for number in range(seeds)] * (len(cells) * len(labels))
+    policies: list[tuple[Any, int]] = []
+    for label in labels:
+        name, gains = LAWS[label]
+        if name == "geometric-load":
+            policies += [(controllers.make(name, env.unwrapped, load_mass_p=mass, **gains), seeds) for mass, _ in cells]
+        else:
+            policies.append((controllers.make(name, env.unwrapped, **gains), seeds * len(cells)))
+    return pd.DataFrame([episode.row for episode in run_vector(env, Together(policies), numbers)])
+
+
+class Together:
+    """Policies side by side, each for so many environments of a vector."""
+
+    def __init__(self, policies: Sequence[tuple[Any, int]]) -> None:
+        stops = np.cumsum([count for _, count in policies]).tolist()
+        self._parts = [
+            (policy, slice(stop - count, stop)) for (policy, count), stop in zip(policies, stops, strict=True)
+        ]
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
+    ) -> tuple[Any, Any]:
+        states = [None] * len(self._parts) if state is None else state
+        found = [
+            policy.predict(observation[part], own, None if own is None else episode_start[part])
+            for (policy, part), own in zip(self._parts, states, strict=True)
+        ]
+        return np.concatenate([action for action, _ in found]), [own for _, own in found]
+
+
+def scenario(mass: float, cable: float) -> dict[str, Any]:
+    """Disturbances of Q-sling with another load."""
+    given = dict(SCENARIOS["Q-sling"].disturbances)
+    payload = {**given["payload"], "mass": {"uniform": [0.95 * mass, 1.05 * mass]}, "cable": cable}
+    return {**given, "payload": payload, "push": [kick(mass)]}
+
+
+def row(label: str, found: pd.DataFrame) -> str:
+    """Return a law's row: means of the flights that end, with intervals; the median settling time, never included."""
+    whole = found[~found["fell"]]
+    cells = [label, f"{len(whole)}/{len(found)}"]
+    for column, (_, scale, digits) in COLUMNS.items():
+        estimate = statistics.mean(scale * whole[column])
+        cells.append(f"{estimate.value:.{digits}f} ({estimate.low:.{digits}f}..{estimate.high:.{digits}f})")
+    settled = whole[SETTLED]
+    middle = statistics.median(settled)
+    cells.append(f"{int(np.isfinite(settled).sum())}/{len(whole)}")
+    cells.append(f"{middle.value:.1f} ({middle.low:.1f}..{middle.high:.1f})" if len(whole) else "")
+    return "| " + " | ".join(cells).replace("inf", "never") + " |"
+
+
+if __name__ == "__main__":
+    main()
