@@ -62,8 +62,8 @@ docs: $(VENV)/docs  ## build the documentation into site/, warnings are errors (
 gallery: $(VENV)/dev  ## remake the pictures of the README and of the documentation (needs chromium; some minutes)
 	OMP_NUM_THREADS=1 $(BIN)/python scripts/gallery.py
 
-viewer:  ## bundle the viewer of replays anew (needs node and npm; its sources are in viewer/src)
-	cd viewer && npm ci --ignore-scripts --no-audit --no-fund && npm run --silent build
+viewer:  ## bundle the viewer of replays anew (needs node and npm; its sources are in scripts/viewer/src)
+	cd scripts/viewer && npm ci --ignore-scripts --no-audit --no-fund && npm run --silent build
 
 constraints: $(VENV)/core  ## pin what is not pinned yet, for every Python (everything anew: rm constraints.txt first)
 	@$(PIP) uv

@@ -36,7 +36,7 @@ from artde_gym.robots.ojas.model import ojas
 from artde_gym.scenarios import SCENARIOS
 
 ROOT = Path(__file__).parents[2]
-VIEWER = ROOT / "viewer"
+VIEWER = ROOT / "scripts/viewer"
 QUADROTOR = "QuadInfinity-Payload-v0"
 SHORT = {"duration": 0.9}
 

@@ -5,7 +5,7 @@ import { copyFileSync, readdirSync, readFileSync } from "node:fs";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 
-const here = dirname(fileURLToPath(import.meta.url)), assets = join(here, "../artde_gym/motion/assets");
+const here = dirname(fileURLToPath(import.meta.url)), assets = join(here, "../../artde_gym/motion/assets");
 const sources = ["build.mjs", "package-lock.json", "package.json", ...readdirSync(join(here, "src")).map((name) => `src/${name}`)].sort();
 const hash = createHash("sha256");
 for (const name of sources) hash.update(`${name}\n`).update(readFileSync(join(here, name)));
