@@ -232,7 +232,7 @@ def test_a_copy_of_a_slung_world_goes_on_as_it_would(engine_name: EngineName) ->
     for one in (engine, other):
         for _ in range(20):
             one.step(np.zeros(0))
-    assert engine.state().position == other.read().position
+    assert engine.state().position == other.state().position
     assert engine.payload_position() == other.payload_position()
     assert engine.payload_position() is not None
 
