@@ -15,6 +15,7 @@ import os
 import platform
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import ParamSpec, TypeVar
@@ -112,8 +113,12 @@ def _sign(folder: Path) -> None:
 
 
 def _holder(folder: Path) -> str:
-    try:
-        found = json.loads((folder / HOLDER).read_text())
-        return f"process {found['pid']} on {found['host']} ({found['command']!r}, since {found['since']})"
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        return "another process"
+    """Name the lock's holder, which signs a moment after it has locked."""
+    for patience in (0.05, 0.2, 1.0, None):
+        try:
+            found = json.loads((folder / HOLDER).read_text())
+            return f"process {found['pid']} on {found['host']} ({found['command']!r}, since {found['since']})"
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
+            if patience is not None:
+                time.sleep(patience)
+    return "another process"

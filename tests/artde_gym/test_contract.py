@@ -191,7 +191,7 @@ def test_what_can_never_happen_is_warned_of(name: str) -> None:
 @pytest.mark.parametrize("name", ours())
 def test_a_vector_says_where_it_runs(name: str) -> None:
     own, default = make(name, vector=True).unwrapped.own_engine, resolve_engine(None)
-    expected = pytest.warns(UserWarning, match=rf"runs in '{own}', gym\.make in '{default}'")
+    expected = pytest.warns(UserWarning, match=rf"uses engine '{own}', but gym\.make uses '{default}'")
     with contextlib.nullcontext() if own == default else expected:
         make(name, vector=True, engine=None)
     with pytest.raises(OptionError, match="sync"):

@@ -780,7 +780,7 @@ def test_all_at_once_are_deterministic_and_can_be_repeated_from_what_was_drawn(e
     assert run(make(EVERYTHING, **kwargs, engine=engine_name), 600, seed=7).bits == first.bits
     drawn = env.unwrapped.sampled_disturbances
     assert drawn.keys() == EVERYTHING.keys()
-    assert Disturbances.parse(drawn, ("chest",), ojas().actuated).sample(np.random.default_rng(1)) == drawn
+    assert Disturbances.parse(drawn, ("chest",), ojas().actuated, "ojas").sample(np.random.default_rng(1)) == drawn
     assert run(make(drawn, **kwargs, engine=engine_name), 600, seed=99).bits == first.bits
 
 

@@ -167,7 +167,7 @@ def test_a_lock_on_a_file_that_its_last_holder_has_just_removed_holds_nothing(
         flock(file, operation)
 
     monkeypatch.setattr(fcntl, "flock", late)
-    with pytest.raises(StoreError, match="nobody else writes"), locked(tmp_path):
+    with pytest.raises(StoreError, match="without another writer"), locked(tmp_path):
         pass
     with locked(tmp_path):
         assert (tmp_path / LOCK).exists()

@@ -23,6 +23,8 @@ IN_ENGINES = {
     "train": [*FLIGHT, "--algo", "ppo", "--out", "out", "--steps", "1"],
     "video": [*FLIGHT, "--controllers", "tde", "--out", "out.gif"],
     "play": FLIGHT,
+    "replay": [*FLIGHT, "--controllers", "tde", "--out", "out.html"],
+    "multiverse": ["--design", "q450", "--worlds", "1", "--no-vectorized", "--out", "out"],
     "reproduce": ["--robot", "quadrotor", "--episodes", "1", "--out", "out"],
 }
 

@@ -30,15 +30,19 @@ ENVIRONMENTS = {
     "BipedWalk-Payload-v0": ("ojas", BIPED),
     "BipedPush-v0": ("ojas", BIPED),
     "QuadInfinity-Payload-v0": ("q450", {"duration": 3.0}),
+    "QuadSling-Payload-v0": ("q450", {"duration": 3.0}),
 }
 SLOW = {"computed-torque"}
 LAWS = list(registered_controllers())
-QUADROTOR_ONLY, BIPED_ONLY = {"asmc", "indi", "geometric"}, {"computed-torque", "tde+balance"}
+SLUNG = {"geometric-load", "tde+swing", "atde+swing", "artde+swing"}
+QUADROTOR_ONLY = {"asmc", "indi", "geometric", *SLUNG}
+BIPED_ONLY = {"computed-torque", "tde+balance", "tde-stiff"}
 CASES = [
     (env_id, base)
     for env_id, (name, _) in ENVIRONMENTS.items()
     for base in LAWS
     if base not in (QUADROTOR_ONLY if name == "ojas" else BIPED_ONLY)
+    if base not in ({"tde+ppo"} if "Sling" in env_id else SLUNG)  # no policy is trained on the slung load
 ]
 
 

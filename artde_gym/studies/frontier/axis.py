@@ -122,7 +122,7 @@ def axis(
 
 def _harder(kind: str | None, name: str) -> Harder:
     """Say which values of a parameter are harder, by what is known of its kind."""
-    parameters = DISTURBANCES[kind].parameters if kind is not None else ()
+    parameters = DISTURBANCES[kind].parameters if kind is not None and kind in DISTURBANCES else ()
     return "smaller" if any(one.name == name and one.smaller_is_harder for one in parameters) else "larger"
 
 

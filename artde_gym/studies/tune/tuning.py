@@ -29,7 +29,7 @@ import pandas as pd
 
 from artde_gym.arguments import check_integer
 from artde_gym.deprecation import takes_old_names
-from artde_gym.errors import OptionError
+from artde_gym.errors import OptionError, suggest_names
 from artde_gym.evaluation import canonical
 from artde_gym.evaluation.environments import metrics_spec_of, single, with_engine
 from artde_gym.evaluation.evaluate import run_plan
@@ -239,6 +239,8 @@ def _best(rows: list[dict[str, Any]]) -> dict[str, Gains]:
 
 def _row(result: Result, name: str, number: int, metric: str, gains: Gains) -> dict[str, Any]:
     (scenario,) = result.scenarios
+    if metric not in result.episodes:
+        raise OptionError("metric", metric, suggest_names(metric, [*map(str, result.episodes)]))
     fell = result.values(scenario, name, "fell") > 0
     error = result.values(scenario, name, metric)
     cost = np.where(fell, FALL * (1 + 1 / (1 + result.values(scenario, name, "duration_s"))), error)

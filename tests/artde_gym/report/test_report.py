@@ -174,7 +174,7 @@ def test_what_follows_a_push_is_a_table_of_the_stored_numbers(walks):
 def test_a_training_says_which_test_was_the_best(training, tmp_path):
     text = (training / "report.html").read_text(encoding="utf-8")
     assert "Best of 3 held-out tests: score -0.01 after 2 million decisions." in text
-    assert "Tests since that were no better: 1, the last one -0.02" in text
+    assert "Later tests without improvement: 1, the last one -0.02" in text
     assert "50 % in the first test, 0 % in the best" in text
     shutil.copytree(training, tmp_path / "run")
     (tmp_path / "run" / "learning_curve.csv").write_text("steps,score\n")
@@ -247,7 +247,7 @@ def test_falls_come_before_errors(tracking):
     assert "it fell in 8 of 8 episodes (beyond chance at 95 %)" in sentences(result, "x", tracking)[1]
     nobody = made_up(a=[(True, 0.1)] * 3, b=[(True, 1.0)] * 3)
     assert sentences(nobody, "x", tracking)[0] == "Every controller fell in every episode."
-    assert "nobody in x" in headline(nobody, {"x": tracking})
+    assert "no controller in x" in headline(nobody, {"x": tracking})
     assert "take the intervals with care" in sentences(nobody, "x", tracking)[-1]
 
 
