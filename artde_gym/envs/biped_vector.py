@@ -15,7 +15,7 @@ from artde_gym.arrays import Array, vectorize
 from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.effects import Effects, load_base
 from artde_gym.disturbances.ground import LOADED, GrfPulses
-from artde_gym.disturbances.kinds import RobotStates
+from artde_gym.disturbances.loads import RobotStates
 from artde_gym.disturbances.schedule import NEVER
 from artde_gym.disturbances.sensing import Sensing
 from artde_gym.envs.biped_disturbances import EpisodeDisturbances

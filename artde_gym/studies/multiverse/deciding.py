@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 from artde_gym.arrays import Array
 from artde_gym.errors import MissingDependencyError
@@ -95,9 +95,9 @@ def what_decides(factors: Array, classes: Sequence[str]) -> Deciding | None:
 def rank_correlations(factors: Array, values: Array) -> tuple[Array, float]:
     """Return Spearman's rank correlation of each factor with some values, and the size that chance exceeds in 5 %."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        ranks = stats.rankdata(factors, axis=0), stats.rankdata(values)
+        ranks = scipy.stats.rankdata(factors, axis=0), scipy.stats.rankdata(values)
         found = [float(np.corrcoef(column, ranks[1])[0, 1]) for column in ranks[0].T]
-    return np.array(found), float(stats.norm.ppf(0.5 + CONFIDENCE / 2) / np.sqrt(max(len(values) - 1, 1)))
+    return np.array(found), float(scipy.stats.norm.ppf(0.5 + CONFIDENCE / 2) / np.sqrt(max(len(values) - 1, 1)))
 
 
 def _scikit_learn() -> tuple[Any, Any, Any]:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import qmc
+import scipy
 
 from artde_gym.arrays import Array
 from artde_gym.errors import OptionError, suggest_names
@@ -91,7 +91,7 @@ def sample(factors: Sequence[Factor], count: int, seed: int) -> list[dict[str, A
 
     More worlds leave those before them as they were.
     """
-    engine = qmc.Sobol(len(factors), scramble=True, bits=BITS, rng=np.random.default_rng(seed))
+    engine = scipy.stats.qmc.Sobol(len(factors), scramble=True, bits=BITS, rng=np.random.default_rng(seed))
     points = engine.random_base2((count - 1).bit_length())[:count]
     return [
         {factor.name: factor.value(share) for factor, share in zip(factors, point, strict=True)}

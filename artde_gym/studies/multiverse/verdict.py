@@ -6,7 +6,7 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest
+import scipy
 
 from artde_gym.arrays import Array
 from artde_gym.evaluation import statistics
@@ -46,7 +46,7 @@ class Verdict:
     def p_value(self) -> float:
         """Of the sign test over worlds, two-sided, ties left out; NaN if there are ties alone."""
         holds, reverses = self.count("holds"), self.count("reverses")
-        return float(binomtest(holds, holds + reverses).pvalue) if holds + reverses else float("nan")
+        return float(scipy.stats.binomtest(holds, holds + reverses).pvalue) if holds + reverses else float("nan")
 
     @property
     def most_favorable(self) -> int | None:
