@@ -1,4 +1,4 @@
-"""A kind of this project may be an effect alone, as CONTRIBUTING says: parameters in `kinds.py`, a function beside it."""
+"""A kind of this project may be an effect alone: its entry in `kinds.py` names a function beside it."""
 
 from __future__ import annotations
 
