@@ -40,7 +40,7 @@ _PAGE = (
 | `render_mode` | None | None | use `vectorization_mode="sync"` to render |
 
 `reset(options={{"disturbances": ..., "scenario": "S2"}})` overrides the disturbances of this and the following
-episodes with a mapping or a named scenario's; nothing is merged: a mapping has to list every disturbance.
+episodes with a mapping or with those of a scenario. Nothing is merged: a mapping has to list every disturbance.
 The option `"reset_mask"` (n,) selects the robots to reset.
 
 ## Vectorization
