@@ -52,15 +52,6 @@ class EffortSignal:
     axes: Mapping[str, int]
 
 
-@renamed_arguments(
-    {
-        "band": "settling_band",
-        "limited": "saturated_field",
-        "means": "diagnostic_means",
-        "near": "saturation_margin",
-        "told": "recorded_info",
-    }
-)
 @dataclasses.dataclass(frozen=True)
 class WatchedSignal:
     """A size that has no reference of its own, such as a swing.
@@ -80,6 +71,15 @@ class WatchedSignal:
     settling_band: float
 
 
+@renamed_arguments(
+    {
+        "band": "settling_band",
+        "limited": "saturated_field",
+        "means": "diagnostic_means",
+        "near": "saturation_margin",
+        "told": "recorded_info",
+    }
+)
 @dataclasses.dataclass(frozen=True)
 class MetricsSpec:
     """Everything that metrics need to know about an environment.

@@ -19,9 +19,9 @@ class LawPolicy(TrackingPolicy):
 
     def __init__(self, name: str, interface: ControlInterface, gains: Any, time_base: float = 1.0) -> None:
         check_positive_number("time_base", time_base)
-        self._law, convert = LAWS[name]
-        self._period = time_base * interface.control_period
-        super().__init__(name, interface, convert(gains, self._period))
+        entry = LAWS[name]
+        self._law, self._period = entry.law, time_base * interface.control_period
+        super().__init__(name, interface, entry.convert(gains, self._period))
 
     def law(self) -> tuple[str, float]:
         return self.name, self._period

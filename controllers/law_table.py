@@ -17,10 +17,17 @@ from controllers.laws.tracking import Array, JointInput, Law, LawState
 
 
 class Entry(NamedTuple):
-    """A law, and how a preset's gains (with the sampling period) become its own."""
+    """A law, and how a preset's gains (with the sampling period) become its own.
+
+    Attributes:
+        gains: dataclass of its presets' gains, if it drives joints; it is then a controller under its name.
+        text: description of that controller.
+    """
 
     law: Law
     convert: Callable[[Any, float], Any]
+    gains: type[Any] | None = None
+    text: str = ""
 
 
 class Nothing(NamedTuple):
@@ -65,27 +72,24 @@ def _equivalent(gains: ConstantGains, _period: float) -> TdeGains:
     return equivalent_gains(gains)
 
 
-GAINS: dict[str, type[Any]] = {
-    "tde": TdeGains,
-    "atde": AtdeGains,
-    "artde": ArtdeGains,
-    "pid": TdeGains,
-    "tde+c": ConstantGains,
-    "tde+kd": ConstantGains,
-    "asmc": AsmcGains,
-    "indi": IndiGains,
-}
-"""Law -> the gains that drive joints with it."""
-
 LAWS: dict[str, Entry] = {
-    "tde": Entry(Law(_tde_init, tde), _same),
-    "atde": Entry(Law(atde_init, atde), _same),
-    "artde": Entry(Law(artde_init, artde), _same),
-    "pid": Entry(Law(_pid_init, pid), identity_gains),
-    "tde+c": Entry(Law(_tde_init, constant_gain_tde), _same),
-    "tde+kd": Entry(Law(_tde_init, tde), _equivalent),
+    "tde": Entry(Law(_tde_init, tde), _same, TdeGains, "time-delay estimation"),
+    "atde": Entry(Law(atde_init, atde), _same, AtdeGains, "TDE + one adaptive gain"),
+    "artde": Entry(Law(artde_init, artde), _same, ArtdeGains, "TDE + adaptive-robust term, as printed in the thesis"),
+    "pid": Entry(
+        Law(_pid_init, pid), identity_gains, TdeGains, "PID; biped: equal to TDE, quadrotor: positional, in both loops"
+    ),
+    "tde+c": Entry(
+        Law(_tde_init, constant_gain_tde), _same, ConstantGains, "TDE + robust term of constant gain (ablation)"
+    ),
+    "tde+kd": Entry(
+        Law(_tde_init, tde), _equivalent, ConstantGains, "TDE at the stiffer gains equivalent to it (ablation)"
+    ),
+    "asmc": Entry(Law(_asmc_init, asmc), _same, AsmcGains, "quadrotor: adaptive sliding mode (this project's own law)"),
+    "indi": Entry(Law(_indi_init, indi), _same, IndiGains, "quadrotor: incremental nonlinear dynamic inversion"),
     "positional-pid": Entry(Law(_positional_pid_init, positional_pid), _same),
-    "asmc": Entry(Law(_asmc_init, asmc), _same),
-    "indi": Entry(Law(_indi_init, indi), _same),
     "rigid-attitude": Entry(Law(_rigid_attitude_init, _rigid_attitude), _same),
 }
+
+GAINS: dict[str, type[Any]] = {name: entry.gains for name, entry in LAWS.items() if entry.gains is not None}
+"""Law -> the gains that drive joints with it."""

@@ -30,9 +30,13 @@ class QuadrotorPolicy(Policy):
     def __init__(
         self, name: str, interface: ControlInterface, gains: CascadeGains, *, laws: tuple[Entry, Entry] | None = None
     ) -> None:
-        (self._position, position), (self._attitude, attitude) = LOOP_LAWS[name] if laws is None else laws
+        position, attitude = LOOP_LAWS[name] if laws is None else laws
+        self._position, self._attitude = position.law, attitude.law
         period = interface.control_period
-        own = {"position": position(gains.position, period), "attitude": attitude(gains.attitude, period)}
+        own = {
+            "position": position.convert(gains.position, period),
+            "attitude": attitude.convert(gains.attitude, period),
+        }
         super().__init__(name, interface, dataclasses.replace(gains, **own))
         self._period = period
         self._at = interface.observation.slices

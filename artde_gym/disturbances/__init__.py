@@ -4,11 +4,10 @@ from artde_gym.disturbances.grammar import Disturbances
 from artde_gym.disturbances.kinds import (
     DISTURBANCES,
     DisturbanceSpec,
-    Load,
     Parameter,
-    RobotStates,
     register_disturbance,
 )
+from artde_gym.disturbances.loads import Load, RobotStates
 
 __all__ = [
     "DISTURBANCES",

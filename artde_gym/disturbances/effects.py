@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
-from artde_gym.disturbances.kinds import DISTURBANCES, Load, RobotStates
+from artde_gym.disturbances.kinds import DISTURBANCES
+from artde_gym.disturbances.loads import Load, RobotStates
 from artde_gym.disturbances.numeric import Words, number_of
 from artde_gym.errors import DisturbanceError
 from artde_gym.sim.engine import State, World

@@ -47,7 +47,7 @@ Gymnasium's `RecordVideo` records one frame per step and plays `metadata["render
 up to 100 steps per second, slow motion at shorter control periods. `artde-gym video` is always in real time.
 
 `reset(options={{"disturbances": ..., "scenario": "S2"}})` overrides the disturbances of this and the following
-episodes with a mapping or a named scenario's; nothing is merged: a mapping has to list every disturbance.
+episodes with a mapping or with those of a scenario. Nothing is merged: a mapping has to list every disturbance.
 
 ## Info
 Only numbers and arrays, with the same keys after `reset` and `step` (`artde_gym.info`): `time_s`; the terms of the

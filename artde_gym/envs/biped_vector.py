@@ -15,7 +15,7 @@ from artde_gym.arrays import Array, vectorize
 from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.effects import Effects, load_base
 from artde_gym.disturbances.ground import LOADED, GrfPulses
-from artde_gym.disturbances.kinds import RobotStates
+from artde_gym.disturbances.loads import RobotStates
 from artde_gym.disturbances.schedule import NEVER
 from artde_gym.disturbances.sensing import Sensing
 from artde_gym.envs.biped_disturbances import EpisodeDisturbances
@@ -40,7 +40,7 @@ _PAGE = (
 | `render_mode` | None | None | use `vectorization_mode="sync"` to render |
 
 `reset(options={{"disturbances": ..., "scenario": "S2"}})` overrides the disturbances of this and the following
-episodes with a mapping or a named scenario's; nothing is merged: a mapping has to list every disturbance.
+episodes with a mapping or with those of a scenario. Nothing is merged: a mapping has to list every disturbance.
 The option `"reset_mask"` (n,) selects the robots to reset.
 
 ## Vectorization

@@ -16,7 +16,8 @@ from numpy.typing import DTypeLike, NDArray
 from artde_gym.arrays import Array
 from artde_gym.disturbances.effects import Effects
 from artde_gym.disturbances.ground_effect import thrust_gain
-from artde_gym.disturbances.kinds import OWN, RobotStates
+from artde_gym.disturbances.kinds import OWN
+from artde_gym.disturbances.loads import RobotStates
 from artde_gym.disturbances.noise import uniform_noise
 from artde_gym.disturbances.schedule import ATTACHED, DROPPED, NEVER, PUSH_BEGINS, PUSH_ENDS, Push
 from artde_gym.disturbances.wind import GRID, Air, advance, air, processes, velocity

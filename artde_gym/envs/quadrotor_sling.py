@@ -18,10 +18,10 @@ class QuadSlingPayloadEnv(QuadInfinityPayloadEnv):
     """A quadrotor flies an infinity-shaped path with a payload on a cable, releases it half-way, and flies on.
 
     ## Description
-    What the thesis leaves as future work (Dantu 2023, chapter 7): the payload hangs on a cable, and its swing has no
+    Future work of the thesis (Dantu 2023, chapter 7): the payload hangs on a cable, and its swing has no
     actuator of its own. The cable is massless, does not stretch and goes slack; see `artde_gym.sim.cable`. The law that
     damps the swing is `controllers.laws.swing`. `gym.make_vec` with `vectorization_mode="vector_entry_point"` gives
-    thousands of the same in NumPy (`artde_gym.envs.quadrotor_sling_vector`).
+    thousands of them in NumPy (`artde_gym.envs.quadrotor_sling_vector`).
 
     {shared}
     | `engine` | None | "bullet", "mujoco", None | physics engine; None: Bullet where it can be imported, else MuJoCo |

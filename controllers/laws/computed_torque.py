@@ -1,4 +1,4 @@
-"""Computed torque: feedback linearisation with a model of the robot, the upper reference for laws without one.
+"""Computed torque: feedback linearization with a model of the robot, the upper reference for laws without one.
 
     tau = ID(q, qd, u),   u = qdd_ref + Kd ed + Kp e,   ID = inverse dynamics of the nominal model
 

@@ -65,7 +65,11 @@ def environment(env_id: str) -> str:
     ]
     if scenarios:
         parts += ["## Scenarios", "\n".join(["| scenario | what it is | arguments |", "|---|---|---|", *scenarios])]
-    parts += ["## Controllers", "Gains of the robot's presets, a controller's first one its default.", _presets(robot)]
+    parts += [
+        "## Controllers",
+        "Gains of the robot's presets. A controller's first preset is its default.",
+        _presets(robot),
+    ]
     if spec.vector_entry_point:
         own = [part for part in _sections(_page(load_env_creator(str(spec.vector_entry_point)))) if part not in page]
         parts += ["## The vector environment", *(part.replace("## ", "### ", 1) for part in own)]

@@ -9,6 +9,7 @@ import pytest
 
 from artde_gym import evaluation
 from artde_gym.deprecation import MODULES
+from artde_gym.metrics_spec import MetricsSpec
 
 
 @pytest.mark.parametrize("old", MODULES)
@@ -35,3 +36,18 @@ def test_an_old_name_of_the_evaluation_is_the_new_one(name: str):
 def test_another_name_is_an_attribute_error():
     with pytest.raises(AttributeError, match="no attribute 'frontiers'"):
         evaluation.__getattr__("frontiers")
+
+
+def test_old_arguments_of_a_metrics_spec_are_the_new_ones():
+    same = {"errors": (), "norm": True, "efforts": (), "power": abs, "tde_errors": {}}
+    with pytest.warns(DeprecationWarning, match="of MetricsSpec is deprecated"):
+        old = MetricsSpec(**same, band=1.0, limited="tau", near=0.1, means={}, told=("time_s",))
+    new = MetricsSpec(
+        **same,
+        settling_band=1.0,
+        saturated_field="tau",
+        saturation_margin=0.1,
+        diagnostic_means={},
+        recorded_info=("time_s",),
+    )
+    assert old == new

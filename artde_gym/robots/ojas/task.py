@@ -115,7 +115,7 @@ For a control period L, L times the sum of scale x term; `info` has each term (`
 | term | scale | value |
 |---|---|---|
 | `alive` | 1 | 1 |
-| `tracking` | 2 | exp(-|e|^2 / 0.02), e = q_ref - q in rad |
+| `tracking` | 2 | exp(-e^T e / 0.02), e = q_ref - q in rad |
 | `upright` | 0.5 | exp(-tilt^2 / 0.05) |
 | `effort` | -0.05 | mean of (tau / 40 Nm)^2 |
 | `smoothness` | -0.05 | mean of (change of tau / 40 Nm)^2 |
