@@ -41,8 +41,8 @@ def test_another_name_is_an_attribute_error():
 
 def test_old_arguments_of_a_metrics_spec_are_the_new_ones():
     same: dict[str, Any] = {"errors": (), "norm": True, "efforts": (), "power": abs, "tde_errors": {}}
+    former: dict[str, Any] = {"band": 1.0, "limited": "tau", "near": 0.1, "means": {}, "told": ("time_s",)}
     with pytest.warns(DeprecationWarning, match="of MetricsSpec is deprecated"):
-        former: dict[str, Any] = {"band": 1.0, "limited": "tau", "near": 0.1, "means": {}, "told": ("time_s",)}
         old = MetricsSpec(**same, **former)
     new = MetricsSpec(
         **same,

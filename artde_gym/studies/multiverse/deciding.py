@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import scipy
+import scipy  # its `stats`, half a second, is imported when it is first used: not by workers
 from numpy.typing import NDArray
 
 from artde_gym.arrays import Array

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import scipy
+import scipy  # its `stats`, half a second, is imported when it is first used: not by workers
 
 from artde_gym.arrays import Array
 from artde_gym.errors import OptionError, suggest_names

@@ -6,7 +6,7 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-import scipy
+import scipy  # its `stats`, half a second, is imported when it is first used: not by workers
 
 from artde_gym.arrays import Array
 from artde_gym.evaluation import statistics
