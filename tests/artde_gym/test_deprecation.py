@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+from typing import Any
 
 import pytest
 
@@ -39,9 +40,10 @@ def test_another_name_is_an_attribute_error():
 
 
 def test_old_arguments_of_a_metrics_spec_are_the_new_ones():
-    same = {"errors": (), "norm": True, "efforts": (), "power": abs, "tde_errors": {}}
+    same: dict[str, Any] = {"errors": (), "norm": True, "efforts": (), "power": abs, "tde_errors": {}}
+    former: dict[str, Any] = {"band": 1.0, "limited": "tau", "near": 0.1, "means": {}, "told": ("time_s",)}
     with pytest.warns(DeprecationWarning, match="of MetricsSpec is deprecated"):
-        old = MetricsSpec(**same, band=1.0, limited="tau", near=0.1, means={}, told=("time_s",))
+        old = MetricsSpec(**same, **former)
     new = MetricsSpec(
         **same,
         settling_band=1.0,
