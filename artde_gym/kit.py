@@ -149,7 +149,7 @@ class RobotKit:
         push: pushes of live play; None: 10 N at the first site.
         report: module with `reference(kwargs)` and `figures(episode)`, see `artde_gym.report.robot`; None: only the
             figures that all robots have.
-        scene: "module:function" that is called with an environment's arguments and returns the
+        scene: "module:function" that is called with an environment's arguments and id and returns the
             `artde_gym.motion.scene.Scene` that replays show; None to make one of a model that is a `RobotSpec`.
         multiverse: file of its standard design of plausible worlds; None if it has none.
     """

@@ -119,7 +119,7 @@ def figure_of(cell: Cell, takes: Mapping[int, Sequence[Take]], ranks: Mapping[in
     return {
         "format": "motion 1",
         "title": f"{entry.name}: {entry.text}" if entry else cell.env_id,
-        "scene": scene_of(robot_of(cell.env_id), cell.kwargs).text(),
+        "scene": scene_of(robot_of(cell.env_id), cell.kwargs, cell.env_id).text(),
         "episodes": episodes,
     }
 

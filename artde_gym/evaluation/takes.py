@@ -116,10 +116,17 @@ def text_of(take: Take, tracking: MetricsSpec, color: str) -> dict[str, Any]:
         "fall": (str(row["fall_reason"]) or "fall") if row["fell"] else "",
         "note": take.note,
         "motion": motion.text(),
+        "hook": _hook(take),
         "pushes": list(_pushes(take)),
         "events": [[time, text] for time, text in _payload_events(take) if time <= row["duration_s"]],
         "series": [_plotted(label, take.traces["time"], values) for label, values in _signals(take, tracking)],
     }
+
+
+def _hook(take: Take) -> list[float] | None:
+    """Return the place in the base frame at which a payload hangs on a cable (m), or None."""
+    payload = take.disturbances.get("payload", {})
+    return [float(part) for part in payload["position"]] if payload.get("cable") else None
 
 
 def _pushes(take: Take) -> Iterable[dict[str, Any]]:

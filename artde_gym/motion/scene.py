@@ -131,8 +131,8 @@ class Scene:
         }
 
 
-def scene_of(robot: str, kwargs: Mapping[str, Any]) -> Scene:
-    """Return the scene of a robot in an environment with these arguments.
+def scene_of(robot: str, kwargs: Mapping[str, Any], env_id: str | None = None) -> Scene:
+    """Return the scene of a robot in an environment with these arguments; None for any environment of the robot.
 
     Raises:
         RobotError: if the robot's kit names none, and its model is no `RobotSpec`.
@@ -140,7 +140,7 @@ def scene_of(robot: str, kwargs: Mapping[str, Any]) -> Scene:
     kit = ROBOTS[robot]
     if kit.scene is not None:
         module, function = kit.scene.split(":")
-        return getattr(importlib.import_module(module), function)(kwargs)
+        return getattr(importlib.import_module(module), function)(kwargs, env_id)
     model = kit.model()
     if not isinstance(model, RobotSpec):
         allowed = '"module:function" in its `RobotKit`, or a RobotSpec as model'

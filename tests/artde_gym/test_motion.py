@@ -287,3 +287,12 @@ def test_the_viewer_is_made_of_these_sources():
     assert built.startswith(f"/* made by `make viewer` of sources {digest.hexdigest()} */"), "run `make viewer`"
     assert "SPDX-License-Identifier: MIT" in built
     assert "three.js authors" in (page.ASSETS / "three.LICENSE.txt").read_text()
+
+
+def test_a_load_on_a_cable_hangs_from_its_hook_under_a_raised_path():
+    low, high = (scene_of("q450", {}, name).path for name in (QUADROTOR, "QuadSling-Payload-v0"))
+    assert low is not None
+    assert high is not None
+    assert np.allclose(high - low, [0.0, 0.0, 1.0])
+    shown = artde_gym.replay(["tde"], "QuadSling-Payload-v0", env_kwargs={"duration": 0.2, "engine": "mujoco"})
+    assert shown.figures[0]["episodes"][0]["runs"][0]["hook"] == [0.0, 0.0, -0.05]

@@ -17,8 +17,9 @@ GROUNDED = 1e-6  # m, that an ankle may be above its lowest
 STRIDE = 20  # samples of the pattern
 
 
-def scene(kwargs: Mapping[str, Any]) -> Scene:
-    """Return what is drawn of a walk with these arguments of the environment."""
+def scene(kwargs: Mapping[str, Any], env_id: str | None = None) -> Scene:
+    """Return the scene of a walk with these arguments of the environment, the same for all its ids."""
+    del env_id
     spec = ojas(kwargs.get("actuator_inertia", "rotor"), arms=kwargs.get("arms", "fixed"))
     pattern = walking_pattern(**pattern_of(kwargs), period=PERIOD)
     path = pattern.base[::STRIDE] * (1.0, 1.0, 0.0) + (0.0, 0.0, 0.004)

@@ -56,7 +56,7 @@ export class Replay {
     if (!this.world) return run;
     const trail = [];
     for (let i = 0; i < run.motion.samples; i += 2) trail.push(run.columns[i * size], run.columns[i * size + 1], scene.outlook.follows ? 0.006 : run.columns[i * size + 2]);
-    run.robot = new Robot(scene, run.color);
+    run.robot = new Robot(scene, run.color, run.hook);
     run.trail = new Path(trail, run.color);
     run.arrow = new Arrow(PUSH);
     run.arrows = scene.contacts.map(() => new Arrow(LOAD, 0.6));

@@ -4,7 +4,7 @@ import {
 } from "three";
 
 const FACES = [[0, 1], [0, -1], [1, 1], [1, -1], [2, 1], [2, -1]];
-const UP = new Vector3(0, 1, 0), PAYLOAD = "#f0e442";  // no controller has it
+const UP = new Vector3(0, 1, 0), PAYLOAD = "#f0e442", CABLE = "#3b4148";  // no controller has the payload's
 
 /** Boxes [sx, sy, sz, cx, cy, cz, "#color"] as one geometry; `tint` replaces the color `from`. */
 function boxes(list, from, tint) {
@@ -28,11 +28,12 @@ function boxes(list, from, tint) {
   return geometry;
 }
 
-/** A robot of a scene; `pose(base, q, payload)` does the forward kinematics by three's own scene graph. */
+/** A robot of a scene; `pose(base, q, payload)` does the forward kinematics by three's own scene graph. A payload on a cable hangs on a `hook` of the base. */
 export class Robot extends Group {
-  constructor(scene, tint) {
+  constructor(scene, tint, hook = null) {
     super();
     this.scene = scene;
+    this.hook = hook;
     this.bodies = [];
     this.material = new MeshLambertMaterial({ vertexColors: true });
     for (const body of scene.bodies) {
@@ -48,7 +49,8 @@ export class Robot extends Group {
     }
     this.ball = new Mesh(new SphereGeometry(scene.payload, 28, 18), new MeshLambertMaterial({ color: PAYLOAD }));
     this.ball.castShadow = true;
-    this.add(this.ball);
+    this.cable = new Mesh(new CylinderGeometry(0.006, 0.006, 1, 8).translate(0, 0.5, 0), new MeshLambertMaterial({ color: CABLE }));
+    this.add(this.ball, this.cable);
     this.ghost(false);
   }
   /** See-through without its inside: its depth is drawn first. */
@@ -93,6 +95,16 @@ export class Robot extends Group {
     this.ball.visible = payload !== null;
     if (payload) this.ball.position.set(...payload);
     this.updateMatrixWorld(true);
+    this.cable.visible = payload !== null && this.hook !== null;
+    if (this.cable.visible) this.hang();
+  }
+  /** Draw the cable from the load to the hook. */
+  hang() {
+    const along = this.point([0, ...this.hook]).sub(this.ball.position), length = along.length();
+    this.cable.position.copy(this.ball.position);
+    this.cable.quaternion.setFromUnitVectors(UP, along.divideScalar(length || 1));
+    this.cable.scale.set(1, length, 1);
+    this.cable.updateMatrixWorld(true);
   }
   /** A place [body, x, y, z] in the world. */
   point([body, x, y, z]) { return new Vector3(x, y, z).applyMatrix4(this.bodies[body].matrixWorld); }

@@ -9,7 +9,7 @@ ROD = (Box((0.04, 0.04, LENGTH), (0.0, 0.0, -LENGTH / 2), (0.2, 0.4, 0.7, 1.0)),
 BACK = (0.0, -1.0, 0.0)  # about which an angle swings a rod ahead
 
 
-def scene(kwargs):
+def scene(kwargs, env_id):
     """Return what is drawn, whatever the arguments of the environment."""
     block = Body("block", (Box((0.12, 0.12, 0.06), (0.0, 0.0, 0.03)),))
     upper = Body("upper arm", ROD, parent=0, axis=BACK, joint=0)
