@@ -17,7 +17,7 @@ from controllers.presets import preset_gains
 from controllers.quadrotor import AXES, LOOP_LAWS, QuadrotorPolicy, make_quadrotor
 
 SWING = "+swing"
-"""What follows a law's name where the swing term is added."""
+"""Suffix of a law's name with the swing term."""
 
 
 class SlungPolicy(QuadrotorPolicy):

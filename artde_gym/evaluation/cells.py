@@ -101,16 +101,19 @@ def validate_cell(vectorized: bool, cell: Cell) -> Any:
 
 def single_of(cell: Cell) -> tuple[Any, dict[str, Any] | None]:
     """Return an environment, and options for its resets; cells that differ only by disturbances share one."""
-    if "disturbances" not in cell.kwargs:
-        return single(cell.env_id, json.dumps(cell.kwargs)), None
-    options = {"disturbances": cell.kwargs["disturbances"]}
-    return single(cell.env_id, json.dumps({**cell.kwargs, "disturbances": {}})), options
+    env = single(cell.env_id, json.dumps(shared_kwargs(cell)))
+    return env, {"disturbances": cell.kwargs["disturbances"]} if "disturbances" in cell.kwargs else None
 
 
 def vector_of(cells: Sequence[Cell], build: Callable[..., Any] = vector) -> tuple[Any, dict[str, Any] | None]:
     """Build a vector with one environment a cell, which differ by disturbances alone, and options for its resets."""
     first = cells[0]
+    env = build(first.env_id, json.dumps(shared_kwargs(first)), len(cells))
     if "disturbances" not in first.kwargs:
-        return build(first.env_id, json.dumps(first.kwargs), len(cells)), None
-    options = {"disturbances": [cell.kwargs["disturbances"] for cell in cells]}
-    return build(first.env_id, json.dumps({**first.kwargs, "disturbances": {}}), len(cells)), options
+        return env, None
+    return env, {"disturbances": [cell.kwargs["disturbances"] for cell in cells]}
+
+
+def shared_kwargs(cell: Cell) -> dict[str, Any]:
+    """Return the arguments that cells of one environment share: disturbances come with each reset."""
+    return {**cell.kwargs, "disturbances": {}} if "disturbances" in cell.kwargs else cell.kwargs

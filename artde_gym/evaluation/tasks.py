@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import Any, NamedTuple
 
-from artde_gym.evaluation.cells import Cell, single_of, vector_of
+from artde_gym.evaluation.cells import Cell, shared_kwargs, single_of, vector_of
 from artde_gym.evaluation.gains import policy_for
 from artde_gym.evaluation.registered import METRICS, require_metrics
 from artde_gym.evaluation.rollout import Episode, Policy, run_episode
@@ -129,9 +129,8 @@ def _groups(cases: Collection[Case]) -> list[list[Case]]:
     """Put cases together that one vector and one policy can run."""
     groups: dict[str, list[Case]] = {}
     for case in cases:
-        kwargs = {name: value for name, value in case.cell.kwargs.items() if name != "disturbances"}
-        own = "disturbances" in case.cell.kwargs
-        key = (case.controller, case.seed, case.cell.env_id, kwargs, own, case.cell.phases, case.gains)
+        cell = case.cell
+        key = (case.controller, case.seed, cell.env_id, shared_kwargs(cell), cell.phases, case.gains)
         groups.setdefault(repr(key), []).append(case)
     return list(groups.values())
 

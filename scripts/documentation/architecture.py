@@ -12,7 +12,7 @@ from documentation.pages import ROOT
 CONTRACT = "Rooms import downwards"
 WIDTH, ROW, GAP = 680, 44, 12  # pixels
 ABOVE = (("controllers", "baselines"),)
-"""What is no part of `artde_gym`, between its command line and all else."""
+"""Packages beside `artde_gym`, drawn between its command line and its rooms."""
 
 
 def rooms() -> str:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 from artde_gym.errors import ArtdeGymError
-from artde_gym.evaluation.cells import Cell, validate_cell, vector_of
+from artde_gym.evaluation.cells import shared_kwargs, validate_cell, vector_of
 from artde_gym.evaluation.gains import policy_for
 from artde_gym.evaluation.registered import METRICS, require_metrics
 from artde_gym.evaluation.rollout import Episode, Policy
@@ -37,7 +37,7 @@ def jobs_of(points: Iterable[Numbered], vectorized: bool) -> Iterator[Job]:
     groups: dict[str, list[Numbered]] = {}
     for number, point in points:
         alone = [number, point.controller]
-        place = [point.cell.env_id, _shared(point.cell)] if vectorized else alone
+        place = [point.cell.env_id, shared_kwargs(point.cell)] if vectorized else alone
         groups.setdefault(json.dumps(place), []).append((number, point))
     for group in groups.values():
         for first in range(0, len(group), MOST):
@@ -103,8 +103,3 @@ def _job(group: Sequence[Numbered], vectorized: bool) -> Job:
         vectorized, first.cell, names, spec, first.gains, list(numbers), seeds, 100.0, 0, cells, tuple(METRICS)
     )  # fmt: skip
     return Job(task, tuple(points))
-
-
-def _shared(cell: Cell) -> dict[str, Any]:
-    """Return the arguments without disturbances, in which worlds of a batch may differ; those of its own it keeps."""
-    return {**cell.kwargs, "disturbances": {}} if "disturbances" in cell.kwargs else cell.kwargs

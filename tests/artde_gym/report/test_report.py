@@ -245,10 +245,10 @@ def test_falls_come_before_errors(tracking):
     result = made_up(a=[(True, 0.1)] * 8, b=[(False, 1.0)] * 8)
     assert ranking(result, "x", "rmse_m") == ["b", "a"]
     assert "it fell in 8 of 8 episodes (beyond chance at 95 %)" in sentences(result, "x", tracking)[1]
-    nobody = made_up(a=[(True, 0.1)] * 3, b=[(True, 1.0)] * 3)
-    assert sentences(nobody, "x", tracking)[0] == "Every controller fell in every episode."
-    assert "no controller in x" in headline(nobody, {"x": tracking})
-    assert "take the intervals with care" in sentences(nobody, "x", tracking)[-1]
+    fallen = made_up(a=[(True, 0.1)] * 3, b=[(True, 1.0)] * 3)
+    assert sentences(fallen, "x", tracking)[0] == "Every controller fell in every episode."
+    assert "no controller in x" in headline(fallen, {"x": tracking})
+    assert "take the intervals with care" in sentences(fallen, "x", tracking)[-1]
 
 
 def test_lyapunov_matrix_solves_its_equation(walks, flights):
