@@ -122,10 +122,14 @@ def _run_until_a_death(
                 raise WorkerError("worker processes", "each started the script again", GUARD) from None
             raise
         finally:
-            stop.value = True
-            pool.shutdown(wait=False, cancel_futures=True)
-            crew.end()
-            channel.close()
+            try:
+                with contextlib.suppress(KeyboardInterrupt):  # a second one, wherever it strikes
+                    stop.value = True
+                    pool.shutdown(wait=False, cancel_futures=True)
+                    crew.wait(GRACE)
+            finally:
+                crew.kill()
+                channel.close()
 
 
 class _Crew:
@@ -140,19 +144,24 @@ class _Crew:
         self.workers.append(SpawnProcess(*args, **kwargs))
         return self.workers[-1]
 
-    def end(self) -> None:
-        """Wait until all workers have ended; kill the remaining ones after a while, or at once when interrupted."""
-        running = {worker.sentinel: worker for worker in self.workers if worker.pid is not None}
-        deadline = time.monotonic() + GRACE
-        with contextlib.suppress(KeyboardInterrupt):
-            while running and (left := deadline - time.monotonic()) > 0:
-                ended: list[Any] = connection.wait(list(running), left)
-                for sentinel in ended:
-                    del running[sentinel]
+    def wait(self, patience: float) -> None:
+        """Wait until all workers have ended, at most for a time (s)."""
+        deadline = time.monotonic() + patience
+        while (running := self._running()) and (left := deadline - time.monotonic()) > 0:
+            connection.wait(list(running), left)
+
+    def kill(self) -> None:
+        """Kill the workers that still run."""
         with ignored_interrupt():  # nothing is left to wait for
-            for worker in running.values():
+            for worker in self._running().values():
                 worker.kill()
                 worker.join()
+
+    def _running(self) -> dict[Any, SpawnProcess]:
+        """Workers by sentinel: the pool's own thread waits for them too, and may reap one first."""
+        started = {worker.sentinel: worker for worker in self.workers if worker.pid is not None}
+        ended = connection.wait(list(started), 0)
+        return {sentinel: worker for sentinel, worker in started.items() if sentinel not in ended}
 
 
 def check_workers(workers: Any) -> None:

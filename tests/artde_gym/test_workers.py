@@ -17,7 +17,7 @@ from artde_gym.evaluation import evaluate
 from artde_gym.studies import frontier, sweep, tune
 
 BLOCKING = """
-import itertools, sys, time
+import itertools, os, signal, sys, time
 from artde_gym.evaluation import evaluate, workers
 
 started = itertools.count()
@@ -32,8 +32,16 @@ class Blocking:
                 time.sleep(1)
         return [0.0] * 4, 0
 
+class Pool(workers.ProcessPoolExecutor):
+    def shutdown(self, *args, **kwargs):
+        print("ends", flush=True)
+        if sys.argv[3] == "interrupted shutdown":
+            os.kill(os.getpid(), signal.SIGINT)
+        super().shutdown(*args, **kwargs)
+
 if __name__ == "__main__":
     workers.GRACE = float(sys.argv[2])
+    workers.ProcessPoolExecutor = Pool
     result = evaluate(
         [Blocking()], "QuadInfinity-Payload-v0", episodes=100, workers=2, out=sys.argv[1],
         env_kwargs={"duration": 0.1}, disturbances={},
@@ -42,11 +50,17 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.parametrize(("grace", "interrupts"), [(0.5, 1), (3600.0, 2)], ids=["after a while", "the second time"])
-def test_ctrl_c_ends_workers_that_block_and_keeps_what_is_finished(tmp_path: Path, grace: float, interrupts: int):
+@pytest.mark.parametrize(
+    ("grace", "interrupts", "moment"),
+    [(0.5, 1, ""), (3600.0, 2, ""), (3600.0, 1, "interrupted shutdown")],
+    ids=["after a while", "the second time", "the second time, before it waits"],
+)
+def test_ctrl_c_ends_workers_that_block_and_keeps_what_is_finished(
+    tmp_path: Path, grace: float, interrupts: int, moment: str
+):
     (tmp_path / "blocking.py").write_text(BLOCKING)
     with subprocess.Popen(
-        [sys.executable, str(tmp_path / "blocking.py"), str(tmp_path / "run"), str(grace)],
+        [sys.executable, str(tmp_path / "blocking.py"), str(tmp_path / "run"), str(grace), moment],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -58,9 +72,10 @@ def test_ctrl_c_ends_workers_that_block_and_keeps_what_is_finished(tmp_path: Pat
             assert [process.stdout.readline() for _ in range(2)] == ["blocks\n"] * 2
             while _rows(tmp_path / "run") < 4:
                 time.sleep(0.05)
-            for _ in range(interrupts):
+            os.killpg(process.pid, signal.SIGINT)
+            assert process.stdout.readline() == "ends\n"  # two that come together would be one
+            for _ in range(interrupts - 1):
                 os.killpg(process.pid, signal.SIGINT)
-                _handled(process.pid)
             output, errors = process.communicate(timeout=100)
         finally:
             process.kill()
@@ -71,14 +86,6 @@ def test_ctrl_c_ends_workers_that_block_and_keeps_what_is_finished(tmp_path: Pat
 def _rows(folder: Path) -> int:
     table = folder / "episodes.csv"
     return table.read_text().count("\n") - 1 if table.exists() else 0
-
-
-def _handled(pid: int) -> None:
-    """Wait until a process has taken notice of a signal: two that come together are one."""
-    pending = True
-    while pending:
-        status = dict(line.split(":", 1) for line in Path(f"/proc/{pid}/status").read_text().splitlines())
-        pending = int(status["ShdPnd"], 16) & 1 << (signal.SIGINT - 1) != 0
 
 
 UNGUARDED = """
