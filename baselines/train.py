@@ -148,7 +148,9 @@ class _Watcher(BaseCallback):
 
 def environments(training: Training, run: Run) -> tuple[VecEnv, Residual]:
     """Environments of a training, and the residual that they share."""
-    kwargs, task = environment_kwargs(training), run.task
+    task = run.task
+    disturbances = task.training(task.level)  # else the environment's own, of which it might warn
+    kwargs = environment_kwargs(training) | ({} if disturbances is None else {"disturbances": disturbances})
     if run.batched:
         env = batched(training.env_id, training.config, training.envs or task.envs, kwargs)
         return env, env.residual

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
 from typing import Any
 
 import gymnasium as gym
@@ -63,6 +64,15 @@ def quick(monkeypatch):
     monkeypatch.setitem(AGENTS["q450"].tasks, QUADROTOR, task)
     monkeypatch.setattr(training_module, "SAC_INTERVAL", 64)
     assert run.task(QUADROTOR) is task
+
+
+def test_a_training_does_not_warn_of_disturbances_that_it_replaces(tmp_path):
+    """The standard push of a walk comes after the 8 s of a training's episodes."""
+    run = Run(Training("BipedPush-v0", ResidualConfig("ojas"), envs=1), tmp_path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        env, _ = environments(run.training, run)
+    env.close()
 
 
 def parameters(folder):
