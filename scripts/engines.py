@@ -66,28 +66,29 @@ def falls(options: argparse.Namespace) -> None:
 
 def both(scenario: str, options: argparse.Namespace, **kwargs: Any) -> dict[str, Result]:
     """Run the same seeds in both engines."""
-    kwargs["actuator_inertia"] = options.actuator_inertia
-    return {
-        engine: evaluate(
-            NAMES,
-            scenario=scenario,
-            episodes=options.episodes,
-            workers=options.workers,
-            env_kwargs={**kwargs, "engine": engine},
-            vectorized=engine == "mujoco",  # the same episodes, faster
-        )
-        for engine in ENGINES
-    }
+    return {engine: run(scenario, engine, options, **kwargs) for engine in ENGINES}
+
+
+def run(scenario: str, engine: str, options: argparse.Namespace, disturbances: Any = None, **kwargs: Any) -> Result:
+    """Run the seeds of a scenario in an engine; `kwargs` are arguments of the environment."""
+    return evaluate(
+        NAMES,
+        scenario=scenario,
+        episodes=options.episodes,
+        workers=options.workers,
+        env_kwargs={**kwargs, "actuator_inertia": options.actuator_inertia, "engine": engine},
+        disturbances=disturbances,
+        vectorized=engine == "mujoco",  # the same episodes, faster
+    )
 
 
 def stiffness(options: argparse.Namespace) -> None:
     """Falls by the time constant of a contact's spring: four times the time is a sixteenth of the stiffness."""
     heading("time constant (ms)", *NAMES)
     for seconds in CONTACT_TIMES:
-        env = make("S2-L4", "mujoco", options)
-        env._engine._model.pair_solref[:, 0] = seconds
-        fallen = [sum(episode["fell"] for episode in walks(env, name, options.episodes)) for name in NAMES]
-        row(f"{1e3 * seconds:g}", *(rate(statistics.rate(count, options.episodes)) for count in fallen))
+        softer = {**SCENARIOS["S2-L4"].disturbances, "contact": {"time_constant": seconds}}
+        result = run("S2-L4", "mujoco", options, disturbances=softer)
+        row(f"{1e3 * seconds:g}", *(rate(result.falls("S2-L4", name)[1]) for name in NAMES))
 
 
 def iterations(options: argparse.Namespace) -> None:
