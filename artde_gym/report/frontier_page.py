@@ -37,7 +37,7 @@ def read_frontier(folder: Path) -> tuple[Frontier, dict[str, Any]]:
         half = parse_table(halves.read_text(encoding="utf-8"), ("controller",)) if halves.exists() else None
         varied, survival = Varied(**wanted["axis"]), wanted["survival"]
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise StoreError("frontier", str(folder), "a folder in which at least one level was finished") from error
+        raise StoreError("frontier", str(folder), "continue the frontier first", "has no finished level") from error
     return Frontier(table, levels, varied, survival, folder, bool(record.get("complete")), half), record
 
 

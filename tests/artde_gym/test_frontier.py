@@ -211,7 +211,7 @@ def test_place_leaves_the_rest_alone() -> None:
     placed, _ = axis(PUSH, "payload.detach_time", 0, 9, 1).place(4.0, given_, {})
     assert placed["payload"] == {"mass": {"uniform": [1, 2]}, "detach_time": 4.0}
     assert axis(PUSH, "control_period").place(0.004, given_, {}) == (given_, {"control_period": 0.004})
-    with pytest.raises(OptionError, match="at least one 'push'"):
+    with pytest.raises(OptionError, match="no 'push' to vary"):
         magnitude.place(7.0, {"push": []}, {})
 
 
@@ -304,7 +304,7 @@ def test_folder_continuation_and_refusal(tmp_path: Path) -> None:
     [
         ({"controllers": ["tdee"]}, UnknownNameError, ["tdee", "did you mean 'tde'"]),
         ({"controllers": []}, OptionError, ["controllers"]),
-        ({"controllers": ["tde", "tde"]}, OptionError, ["tde", "once"]),
+        ({"controllers": ["tde", "tde"]}, OptionError, ["tde", "twice"]),
         ({"survival": 0.0}, OptionError, ["survival", "0.0"]),
         ({"episodes": 0}, OptionError, ["episodes", "0"]),
         ({"gains": {"atde": {}}}, UnknownNameError, ["gains", "atde"]),
