@@ -153,9 +153,9 @@ def check_file_name(field: str, value: object) -> str:
     if not (isinstance(value, str) and 0 < len(value) <= 100 and value[0] != "." and value.isprintable()):
         raise OptionError(field, value, "up to 100 printable characters, the first no dot")
     if len(value.encode()) > NAME_BYTES:
-        raise OptionError(field, value, f"up to {NAME_BYTES} bytes of UTF-8: files are named by it")
+        raise OptionError(field, value, f"up to {NAME_BYTES} bytes of UTF-8, as files are named by it")
     if "/" in value or "\\" in value:
-        raise OptionError(field, value, "a name without slashes: files are named by it")
+        raise OptionError(field, value, "choose another name, as files are named by it", "contains a slash")
     return value
 
 
@@ -170,7 +170,8 @@ def wrap_read_errors(field: str, path: Path, allowed: str, kind: type[ArtdeGymEr
     except kind:
         raise
     except Exception as error:
-        raise kind(field, str(path), f"{allowed} ({type(error).__name__}: {error})") from error
+        problem = f"cannot be read ({type(error).__name__}: {error})"
+        raise kind(field, str(path), f"it must be {allowed}", problem) from error
 
 
 def steps_per_period(control_period: float, step: float) -> int:

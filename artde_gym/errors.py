@@ -1,20 +1,32 @@
-"""Errors that a user can cause and fix; each names the field, the value and what is allowed."""
+"""Errors that a user can cause and fix; each names the field, the value and what is allowed, or what to do."""
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Collection
+from typing import Self
 
 
 class ArtdeGymError(ValueError):
-    """`field` has a `value` that is not `allowed`."""
+    """`field` has a `value` that is not `allowed`; or it has a `problem`, and `allowed` says what to do.
 
-    def __init__(self, field: str, value: object, allowed: str) -> None:
-        super().__init__(field, value, allowed)  # the same arguments, so that workers can pickle it
-        self.field, self.value, self.allowed = field, value, allowed
+    The two sentences are "field is value; allowed: ..." for ranges, and "field value problem; ..." for all else:
+    "engine is 'ode'; allowed: ...", "output folder 'runs/1' contains other files; choose a new or empty folder".
+    """
+
+    def __init__(self, field: str, value: object, allowed: str, problem: str = "") -> None:
+        super().__init__(field, value, allowed, *filter(None, (problem,)))  # so that workers can pickle it
+        self.field, self.value, self.allowed, self.problem = field, value, allowed, problem
 
     def __str__(self) -> str:
+        if self.problem:
+            return f"{self.field} {self.value!r} {self.problem}; {self.allowed}"
         return f"{self.field} is {self.value!r}; allowed: {self.allowed}"
+
+    def within(self, place: str) -> Self:
+        """Return the same error with a place beside the field."""
+        _, *rest = self.args
+        return type(self)(f"{self.field} ({place})", *rest)
 
 
 class RobotError(ArtdeGymError):
@@ -65,7 +77,10 @@ class StoreError(ArtdeGymError):
 
 
 class WorkerError(ArtdeGymError):
-    """Worker processes that ended before their work was done."""
+    """Worker processes that ended before their work was done; `value` says in words how, `allowed` what to do."""
+
+    def __str__(self) -> str:
+        return f"{self.field} {self.value}; {self.allowed}"
 
 
 def suggest_names(name: object, known: Collection[str]) -> str:

@@ -105,8 +105,9 @@ def make_controller(name: str, env: Any, /, **overrides: Any) -> Any:
     """
     known = _known(name)
     for fixed in known.kwargs.keys() & overrides.keys() - {REPLACEABLE}:
-        allowed = f"its gains, `preset` and options; {name!r} stands for {fixed} = {known.kwargs[fixed]!r}"
-        raise OptionError(f"gains of {name!r}", {fixed: overrides[fixed]}, allowed)
+        problem = f"cannot be changed: the name stands for {fixed} = {known.kwargs[fixed]!r}"
+        todo = "choose another controller, or change its gains, `preset` and options"
+        raise OptionError(f"gains of {name!r}", {fixed: overrides[fixed]}, todo, problem)
     make, arguments = _imported(name, known.entry_point), {**known.kwargs, **overrides}
     try:
         inspect.signature(make).bind(env, **arguments)
@@ -148,8 +149,10 @@ def _imported(name: str, entry_point: str) -> Callable[..., Any]:
     try:
         found = resolved(entry_point)
     except (ImportError, AttributeError) as error:
-        allowed = f'"module:function" of what can be imported ({error})'
-        raise UnknownNameError(f"entry point of {name!r}", entry_point, allowed) from error
+        todo = 'give a "module:function" that can'
+        raise UnknownNameError(
+            f"entry point of {name!r}", entry_point, todo, f"cannot be imported ({error})"
+        ) from error
     if not callable(found):
         raise UnknownNameError(f"entry point of {name!r}", entry_point, '"module:function" of a function or class')
     return found

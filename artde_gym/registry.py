@@ -103,11 +103,11 @@ class Registry(Mapping[str, T], Generic[T]):
             return point.load()
         except (ImportError, AttributeError) as error:
             owner = "a plug-in" if point.dist is None else point.dist.name
-            allowed = f'"module:object" that can be imported ({error}); repair or uninstall {owner}'
-
-            raise UnknownNameError(f"entry point of {point.name!r} in {self.group}", point.value, allowed) from error
+            problem = f"cannot be imported ({error})"
+            field = f"entry point of {point.name!r} in {self.group}"
+            raise UnknownNameError(field, point.value, f"repair or uninstall {owner}", problem) from error
 
     def _add(self, name: str, entry: T, replace: bool) -> None:
         if name in self._entries and not replace:
-            raise OptionError(self.noun, name, "a name that is not taken, or replace=True")
+            raise OptionError(self.noun, name, "choose another name, or replace=True", "is taken")
         self._entries[name] = entry

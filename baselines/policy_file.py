@@ -95,9 +95,10 @@ def read(folder: Path) -> Saved:
         raise PolicyFileError("description", str(folder / DESCRIPTION), "a JSON object")
     version = description.get("version")
     if not (type(version) is int and version == VERSION):
-        raise PolicyFileError(f"version of {folder / DESCRIPTION}", version, f"{VERSION}, what this release reads")
+        raise PolicyFileError(f"version of {folder / DESCRIPTION}", version, f"{VERSION}, which this release reads")
     if hashlib.sha256(content).hexdigest() != description.get("weights_sha256"):
-        raise PolicyFileError("weights", str(folder / WEIGHTS), f"the file that {DESCRIPTION} was written with")
+        problem = f"do not belong to {DESCRIPTION}"
+        raise PolicyFileError("weights", str(folder / WEIGHTS), "copy both files again", problem)
     with wrap_read_errors("policy", folder, "what `baselines` writes", PolicyFileError):
         return _saved(description, content)
 

@@ -158,9 +158,8 @@ class Run:
             TrainingError: for a base that a policy's file could not hold.
         """
         if isinstance(residual.base, ResidualPolicy):
-            raise TrainingError(
-                "base", self.training.config.base, "a law; a policy's file does not hold another policy"
-            )
+            problem = "is a trained policy, which a policy's file cannot hold"
+            raise TrainingError("base", self.training.config.base, "choose a law", problem)
         if not self.state["tests"]:
             size, count = residual.features.size, len(residual.actions)
             layer = np.zeros((size, count), np.float32), np.zeros(count, np.float32)
@@ -257,7 +256,8 @@ def _refuse_others(folder: Path, configuration: dict[str, Any], free: set[str]) 
         before = current_configuration(json.loads(file.read_text(encoding="utf-8"))["configuration"])
     for name, value in configuration.items():
         if name not in {"steps", "options", "patience", *free} and before.get(name) != value:
-            raise TrainingError(f"{name} of the run in {folder}", value, f"{before.get(name)!r}, or another folder")
+            problem = f"differs from {before.get(name)!r} of the run in {folder}"
+            raise TrainingError(name, value, "choose another folder", problem)
 
 
 def _claim(folder: Path, configuration: dict[str, Any]) -> None:

@@ -17,6 +17,7 @@ from controllers import GainError
 from controllers.policies import ControlInterface
 
 SHIPPED = Path(__file__).parent / "policies"
+RETRAIN = "train it again with this release"
 EXPORT = "policy"
 """Folder of the best policy in that of a training run."""
 
@@ -97,15 +98,19 @@ def nominal_name(robot: str, env_kwargs: dict[str, Any]) -> str:
 def _policy(saved: Saved, env: Any) -> ResidualPolicy:
     interface = ControlInterface.of(env)
     if interface.robot != saved.config.robot:
-        raise PolicyFileError(f"robot of {saved.name!r}", saved.config.robot, f"{interface.robot!r} of the environment")
+        problem = f"is not {interface.robot!r}, that of the environment"
+        raise PolicyFileError(f"robot of {saved.name!r}", saved.config.robot, "choose another policy", problem)
     try:
         residual = Residual.of(env, saved.config)
     except (ArtdeGymError, GainError):
         raise
     except Exception as error:  # the recipe's gains may be anything, for a base that takes almost any
-        raise PolicyFileError(f"recipe of {saved.name!r}", saved.config, f"one that works ({error!r})") from error
+        problem = f"does not work ({error!r})"
+        raise PolicyFileError(f"config of {saved.name!r}", saved.config, RETRAIN, problem) from error
     if layout_hash(residual.features) != saved.features or len(saved.network.mean) != residual.features.size:
-        raise PolicyFileError(f"what {saved.name!r} sees", saved.features, f"{layout_hash(residual.features)} here")
+        problem = f"differ from {layout_hash(residual.features)} here"
+        raise PolicyFileError(f"features of {saved.name!r}", saved.features, RETRAIN, problem)
     if tuple(residual.actions) != saved.actions or len(saved.network.layers[-1][1]) != len(residual.actions):
-        raise PolicyFileError(f"what {saved.name!r} does", saved.actions, f"{tuple(residual.actions)} here")
+        problem = f"differ from {tuple(residual.actions)} here"
+        raise PolicyFileError(f"actions of {saved.name!r}", saved.actions, RETRAIN, problem)
     return ResidualPolicy(saved.name, interface, residual, saved.network)

@@ -20,7 +20,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv,
 
 from artde_gym.errors import WorkerError
 from artde_gym.evaluation.lock import writes_folder
-from artde_gym.evaluation.workers import GUARD, ignored_interrupt
+from artde_gym.evaluation.workers import FEWER, GUARD, ignored_interrupt
 from artde_gym.layout import Layout
 from baselines.checkpoint import Checkpoints
 from baselines.errors import TrainingError
@@ -168,8 +168,8 @@ def _processes(makers: list[Callable[[], gym.Env[Any, Any]]]) -> VecEnv:
         with ignored_interrupt():
             return SubprocVecEnv(makers, start_method="spawn")
     except (EOFError, ConnectionError) as error:  # it does not say what its processes ended with
-        allowed = f"workers that live: if memory is short, take fewer of them; they need {GUARD}"
-        raise WorkerError("worker processes", "ended when they had just started", allowed) from error
+        todo = f"{FEWER}; or use {GUARD}"
+        raise WorkerError("worker processes", "ended when they had just started", todo) from error
 
 
 def _worker_env(env_id: str, kwargs: dict[str, Any], config: ResidualConfig) -> ResidualEnv:

@@ -107,10 +107,10 @@ class ResidualVecEnv(VecEnv):
         return [getattr(owner, attr_name, None)] * len(list(self._get_indices(indices)))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        raise OptionError("attribute to set", attr_name, "none: they share one environment")
+        raise OptionError("attribute", attr_name, "set it before", "cannot be set for one environment of a vector")
 
     def env_method(self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any) -> list[Any]:
-        raise OptionError("method to call", method_name, "none: they share one environment")
+        raise OptionError("method", method_name, "call it before", "cannot be called for one environment of a vector")
 
     def env_is_wrapped(self, wrapper_class: type[gym.Wrapper[Any, Any, Any, Any]], indices: Any = None) -> list[bool]:
         return [False] * len(list(self._get_indices(indices)))

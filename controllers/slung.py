@@ -31,8 +31,8 @@ class SlungPolicy(QuadrotorPolicy):
         self, name: str, interface: ControlInterface, gains: CascadeGains, *, laws: tuple[Entry, Entry]
     ) -> None:
         if "cable" not in interface.observation.slices:
-            raise OptionError(f"observation of the environment of {name!r}", list(interface.observation.slices),
-                              "with a cable, as that of QuadSling-Payload-v0")  # fmt: skip
+            raise OptionError("controller", name, "choose QuadSling-Payload-v0 or another one",
+                              "needs an environment that observes a cable")  # fmt: skip
         super().__init__(name, interface, gains, laws=laws)
 
     def cable(self, observation: Array) -> Cable:

@@ -24,8 +24,9 @@ ROOT = Path(__file__).parents[1]
 PLUGIN = ROOT / "tests/plugin"
 PAGE = (ROOT / "docs/tutorials/own-robot.md").read_text(encoding="utf-8")
 RUN = """
-import json, sys
+import json, sys, warnings
 import artde_gym
+warnings.filterwarnings("error", ".* is deprecated; use ", DeprecationWarning)
 code, commands = json.load(sys.stdin)
 exec(code)
 if commands:
@@ -70,10 +71,10 @@ AGENT = """
 import numpy as np
 import gymnasium as gym
 import controllers
-from baselines.residual_config import Recipe
+from baselines.residual_config import ResidualConfig
 from baselines.residual_env import ResidualEnv
 env, plain = (gym.make("TwoLinkArm-Swing-v0", duration=0.2) for _ in range(2))
-agent, policy = ResidualEnv(env, Recipe("two-link-arm")), controllers.make("tde", plain)
+agent, policy = ResidualEnv(env, ResidualConfig("two-link-arm")), controllers.make("tde", plain)
 agent.reset(seed=1)
 observation, _ = plain.reset(seed=1)
 state = None

@@ -101,6 +101,6 @@ def resident() -> int:
         OptionError: on systems other than Linux.
     """
     if not MEMORY.exists():
-        raise OptionError("operating system", platform.system(), "Linux, which reports a process's memory in /proc")
+        raise OptionError("operating system", platform.system(), "Linux, where /proc has a process's memory")
     pages = int(MEMORY.read_text(encoding="ascii").split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE")

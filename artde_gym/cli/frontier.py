@@ -35,6 +35,7 @@ from artde_gym.kit import ROBOTS
 from artde_gym.report.frontier_page import survival_chart
 from artde_gym.studies import frontier as run_frontier
 from artde_gym.studies.frontier.console import print_frontier
+from artde_gym.studies.frontier.result import Frontier
 
 _TESTS = [entry.frontier or kit.frontier for kit in ROBOTS.values() for entry in kit.environments]
 VARIED = dict.fromkeys(path for test in _TESTS if test for path in test.ranges)
@@ -65,9 +66,7 @@ def frontier(
     grid: Annotated[
         bool, typer.Option("--grid", help="Run every level, not only those of a bisection; 50 % points, too.")
     ] = False,
-    figure: Annotated[
-        Path | None, typer.Option(help="SVG of survival over what is varied, one file a scenario.")
-    ] = None,
+    figure: Annotated[Path | None, typer.Option(help="Another place for frontier.svg, one file a scenario.")] = None,
     allow_mixed: AllowMixed = False,
     report: Report = False,
 ) -> None:
@@ -102,8 +101,7 @@ def frontier(
         if len(scenarios) > 1:
             console.rule(str(one))
         print_frontier(found, console)
-        if figure is not None:
-            path = figure if one is None else figure.with_stem(f"{figure.stem}-{one}")
+        for path in _figures(found, figure, one):
             write_atomically(
                 path, lambda file, found=found: file.write(survival_chart(found, legend=True).file().encode())
             )
@@ -111,3 +109,13 @@ def frontier(
             show_report(found.folder, console)
         if not found.complete:
             raise typer.Exit(130)
+
+
+def _figures(found: Frontier, figure: Path | None, scenario: str | None) -> list[Path]:
+    """Return where the figure of a frontier is written: nowhere before a level has been run."""
+    if found.levels.empty:
+        return []
+    own = [] if found.folder is None else [found.folder / "frontier.svg"]
+    return (
+        own if figure is None else [*own, figure if scenario is None else figure.with_stem(f"{figure.stem}-{scenario}")]
+    )

@@ -46,7 +46,9 @@ def play(
     try:
         plant = single(cell.env_id, json.dumps(cell.kwargs))
         if not hasattr(plant.unwrapped, "engine"):
-            raise OptionError("env", cell.env_id, "an environment with a physics engine, which a window can show")
+            raise OptionError(
+                "env", cell.env_id, "choose one that has", "has no physics engine that a window could show"
+            )
         policy = make_controller(controller, plant, **overrides)
         window.load(plant.unwrapped.engine.spec)
         print("\n".join((*HELP, "A click pushes away from the viewer, at the nearest site of the robot.")))

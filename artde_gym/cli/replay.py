@@ -72,7 +72,9 @@ def replay(
             own = {"--env": env, "--engine": engine, "--disturbances": disturbances, "--env-kwargs": env_kwargs}
             for option, value in {**own, "--gains": gains}.items():
                 if value is not None:
-                    raise OptionError(option, value, "nothing beside a folder: its episodes are as they were run")
+                    raise OptionError(
+                        option, value, "leave it out", "does not go with a folder, whose episodes stay as they were run"
+                    )
             wanted = None if scenario is None else names(scenario)
             chosen = None if controllers is None else names(controllers)
             made = replay_folder(folder, wanted, chosen, episode, on_progress=told)

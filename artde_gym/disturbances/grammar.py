@@ -119,7 +119,7 @@ def _require_load(entries: Sequence[tuple[str, Mapping[str, Any]]]) -> None:
     kinds = {name for name, _ in entries}
     for name, entry in entries:
         if name == "push" and entry["body"] == PAYLOAD and "payload" not in kinds:
-            raise DisturbanceError("push.body", PAYLOAD, "a site of the robot itself: there is no payload")
+            raise DisturbanceError("push.body", PAYLOAD, "choose a site of the robot, or add a payload", "is missing")
 
 
 def _idle(entry: Mapping[str, Any], duration: float) -> str:

@@ -17,7 +17,7 @@ from artde_gym.doctor.check_result import CheckResult, Status
 from artde_gym.sim.factory import missing_bullet
 
 PACKAGE = "artde-gym"
-MODULES = {"mujoco": "mujoco", "numpy": "numpy", "scipy": "scipy", "matplotlib": "matplotlib", "pandas": "pandas"}
+MODULES = {"mujoco": "mujoco", "numpy": "numpy", "scipy": "scipy", "pandas": "pandas"}
 """Packages with compiled parts -> modules whose import proves that they load."""
 FREE_DISK_BYTES = 1e9  # bytes, enough for most results folders
 RUNS = Path("runs")

@@ -46,7 +46,7 @@ def cells_of(
         raise OptionError("env_id", env_id, "the id of an environment, or None")
     kwargs = _mapping("env_kwargs", kwargs or {}, "a mapping of environment arguments")
     if "disturbances" in kwargs:
-        raise OptionError("env_kwargs", "disturbances", "environment arguments; pass disturbances as `disturbances`")
+        raise OptionError("argument in env_kwargs", "disturbances", "pass it as `disturbances`", "has its own place")
     if disturbances is not None:
         disturbances = _mapping("disturbances", disturbances, "a mapping of kinds to their parameters")
         disturbances = current_disturbances(disturbances, told=True)
@@ -70,7 +70,7 @@ def _scenarios(env_id: str | None, names: str | Sequence[str]) -> list[Scenario]
     if not entries:
         raise OptionError("scenario", names, "at least one name, or None")
     if again := canonical.twice(entry.name for entry in entries):
-        raise OptionError("scenario", again, "each name once")
+        raise OptionError("scenario", again, "give each name once", "is given twice")
     for entry in entries:
         if env_id not in (None, entry.env_id):
             raise OptionError(f"environment of scenario {entry.name!r}", env_id, repr(entry.env_id))

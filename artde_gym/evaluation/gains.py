@@ -40,5 +40,5 @@ def policy_for(item: Policy | ControllerSpec, env: Any, gains: dict[str, Any]) -
         register_spec(item)  # a worker otherwise knows only this project's own registrations
         return make_controller(item.name, env, **gains)
     if gains:
-        raise OptionError("gains", gains, "gains of registered names only; set them on the policy object")
+        raise OptionError("gains", gains, "set them on the policy object", "belong to no registered name")
     return item

@@ -34,7 +34,7 @@ def labeled(controllers: Any) -> dict[str, str | Policy]:
         if not isinstance(label, str):
             raise OptionError("name of a controller", label, "text")
     if again := canonical.twice(label for label, _ in pairs):
-        raise OptionError("controllers", again, "each name once; pass a mapping to label each one")
+        raise OptionError("controller", again, "pass a mapping to label each one", "is given twice")
     return dict(pairs)
 
 

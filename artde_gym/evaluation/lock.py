@@ -27,6 +27,7 @@ from artde_gym.evaluation.provenance import command
 from artde_gym.evaluation.workers import end_unguarded
 
 LOCK, HOLDER = ".lock", ".lock.json"
+NEW_OR_EMPTY = "choose a new or empty folder"
 
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")
@@ -88,12 +89,12 @@ def _acquire(folder: Path) -> tuple[list[Path], FileLock]:
         lock.acquire()
         _sign(folder)
     except Timeout:
-        allowed = f"a folder without another writer; in use by {_holder(folder)}"
-        raise StoreError("output folder", str(folder), allowed) from None
+        problem = f"is in use by {_holder(folder)}"
+        raise StoreError("output folder", str(folder), "choose a folder without another writer", problem) from None
     except (FileExistsError, NotADirectoryError):
-        raise StoreError("output folder", str(folder), "a new or empty folder; this one contains other files") from None
+        raise StoreError("output folder", str(folder), NEW_OR_EMPTY, "contains other files") from None
     except OSError as error:
-        raise StoreError("output folder", str(folder), f"a writable folder ({error})") from error
+        raise StoreError("output folder", str(folder), "choose another one", f"is not writable ({error})") from error
     return made, lock
 
 

@@ -221,7 +221,9 @@ class Metrics:
             columns |= watched.columns(self._count, fell)
         for registered in self._registered:
             if registered.name in columns:
-                raise OptionError("name of a metric", registered.name, "a name without another column")
+                raise OptionError(
+                    "name of a metric", registered.name, "choose another name", "is that of another column"
+                )
             columns[registered.name] = registered.value
         return [
             dict(zip(columns, row, strict=True))

@@ -68,14 +68,13 @@ def continued(
     """
     if before is None:
         return now
-    with wrap_read_errors(
-        "provenance of the results", folder, "a record as it was written; or a new folder", StoreError
-    ):
+    with wrap_read_errors("provenance of the results", folder, "as it was written; or choose a new folder", StoreError):
         mixed, differences = list(before.get(MIXED, [])), _differences(before, now)
     for what, (old, new) in differences.items():
         if not allow_mixed:
-            allowed = f"{old}, which the results in {folder} were made with; or a new folder, or --allow-mixed"
-            raise StoreError(what, new, f"{allowed} (allow_mixed=True), which stays in its provenance")
+            problem = f"differs from {old}, with which the results in {folder} were made"
+            todo = "choose a new folder, or --allow-mixed (allow_mixed=True), which stays in its provenance"
+            raise StoreError(what, new, todo, problem)
     software = {name: before.get(name) for name in _SOFTWARE}
     mixed += [software] if differences and software not in mixed else []
     return {**now, MIXED: mixed} if mixed else now

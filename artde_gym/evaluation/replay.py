@@ -219,8 +219,8 @@ class _Archive:
     def _again(self, cell: Cell, name: str, row: Row, on_progress: Progress | None) -> Take:
         known = registered_controllers()
         if name not in known:
-            allowed = "a registered name, to be run again: the folder has no motion of it"
-            raise UnknownNameError("controller", name, f"{allowed}; {suggest_names(name, known)}")
+            problem = "has no motion in the folder, and no registered name by which it could be run again"
+            raise UnknownNameError("controller", name, f"registered are {suggest_names(name, known)}", problem)
         gains = self._configuration.get("gains", {}).get(name, {})
         return new_take(cell, name, known[name], gains, int(row["seed"]), row, _told(on_progress, name))
 

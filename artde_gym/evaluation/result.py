@@ -61,8 +61,9 @@ class Result:
         twice = self.episodes.duplicated(["scenario", "controller", *episode_key(self.episodes)])
         if twice.any():
             first = self.episodes[twice].iloc[0]
-            which = f"{first['controller']} in {first['scenario']} with the seed {first['seed']} twice"
-            raise OptionError("episodes", which, "each scenario, controller, seed and drawn disturbances once")
+            problem = f"of {first['controller']} in {first['scenario']} has two episodes"
+            todo = "give each scenario, controller, seed and drawn disturbances once"
+            raise OptionError("seed", first["seed"], todo, problem)
 
     @property
     def controllers(self) -> list[str]:
@@ -84,7 +85,9 @@ class Result:
             OptionError: if they are not stored in a folder.
         """
         if self.folder is None:
-            raise OptionError("folder", None, "a result that is stored, evaluate(..., out=...); or `artde_gym.replay`")
+            raise OptionError(
+                "folder", None, "store with evaluate(..., out=...), or use `artde_gym.replay`", "holds no result"
+            )
         return replay_folder(self.folder, scenario, controllers, episode)
 
     def _different(self, column: str) -> list[str]:

@@ -27,14 +27,15 @@ from numpy.typing import NDArray
 from artde_gym.arguments import check_file_name, wrap_read_errors
 from artde_gym.deprecation import current_column, current_configuration
 from artde_gym.errors import OptionError, StoreError
-from artde_gym.evaluation.lock import is_empty
+from artde_gym.evaluation.lock import NEW_OR_EMPTY, is_empty
 from artde_gym.evaluation.provenance import MIXED, continued
 from artde_gym.evaluation.seeds import episode_seed, with_exact_seeds
 
 RECORD, TABLE = "summary.json", "episodes.csv"
 KEY = ("scenario", "controller", "episode")
 _WORDS = ("scenario", "controller", "env", "fall_reason")
-_UNDAMAGED = "a table of episodes as `evaluate` wrote it; delete the damaged rows to run these episodes again"
+_REPAIR = "delete the damaged rows to run these episodes again"
+_UNDAMAGED = f"a table of episodes as `evaluate` wrote it; {_REPAIR}"
 
 
 class Store:
@@ -111,11 +112,11 @@ class Store:
         for column, values in zip(KEY, known, strict=True):
             strange = [value for value in frame[column] if value not in values]
             if strange:
-                raise StoreError(TABLE, str(path), f"{_UNDAMAGED} (it has a {column} {strange[0]!r})")
+                raise StoreError(TABLE, str(path), _REPAIR, f"has a {column} {strange[0]!r} of another run")
         rows = [{str(key): value for key, value in row.items()} for row in frame.to_dict(orient="records")]
         for row in rows:
             if row["seed"] != episode_seed(wanted["seed"], row["episode"]):
-                raise StoreError(TABLE, str(path), f"{_UNDAMAGED} (episode {row['episode']} has another seed)")
+                raise StoreError(TABLE, str(path), _REPAIR, f"has another seed for episode {row['episode']}")
         if path.stat().st_size != len(whole.encode()):
             write_atomically(path, lambda file: file.write(whole.encode()))
         return rows
@@ -255,11 +256,11 @@ def claim(folder: Path, record: str, configuration: Mapping[str, Any]) -> Mappin
             before = dict(content.get("provenance", {}))
         if found != configuration:
             differs = [key for key in {*found, *configuration} if found.get(key) != configuration.get(key)]
-            allowed = f"a new folder; this one contains other results (different: {', '.join(sorted(differs))})"
-            raise StoreError("output folder", str(folder), allowed)
+            problem = f"contains other results (different: {', '.join(sorted(differs))})"
+            raise StoreError("output folder", str(folder), "choose a new folder", problem)
         return before
     if folder.exists() and not (folder.is_dir() and is_empty(folder)):
-        raise StoreError("output folder", str(folder), "a new or empty folder; this one contains other files")
+        raise StoreError("output folder", str(folder), NEW_OR_EMPTY, "contains other files")
     folder.mkdir(parents=True, exist_ok=True)
     return None
 
@@ -271,7 +272,7 @@ def check_replaceable(path: Path) -> None:
         StoreError: if it is anything but a file.
     """
     if path.exists() and not path.is_file():
-        raise StoreError("output file", str(path), "a new file, or one that is replaced; this is something else")
+        raise StoreError("output file", str(path), "choose another name", "is not a file that could be replaced")
 
 
 def write_atomically(path: Path, write: Callable[[BinaryIO], Any], by_way_of: Path | None = None) -> None:

@@ -51,7 +51,12 @@ class Take(NamedTuple):
         """
         motion = Motion.read(self.traces)
         if motion is None:
-            raise OptionError("env_id", self.row.get("env"), "an environment with a method `pose`, which replays show")
+            raise OptionError(
+                "env_id",
+                self.row.get("env"),
+                "choose another one, or add the method",
+                "has no method `pose`, which replays show",
+            )
         return motion
 
     @property

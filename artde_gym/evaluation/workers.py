@@ -33,6 +33,7 @@ UNGUARDED = 79
 MOST_WORKERS = 1024
 DEATHS = 3
 """Number of deaths in a row, without a finished job in between, after which the jobs are believed to kill workers."""
+FEWER = "if memory is short, use fewer workers"
 GUARD = "a script that starts nothing at import; put the call below `if __name__ == '__main__':`"
 
 Job = Any
@@ -76,8 +77,7 @@ def run_parallel(work: Work, jobs: Iterable[Job], workers: int, on_time: OnTime)
                 return
             except BrokenProcessPool:
                 deaths += 1
-    allowed = "workers that keep running; if memory is short, use fewer workers"
-    raise WorkerError("worker processes", f"ended {DEATHS} times before a job was done", allowed)
+    raise WorkerError("worker processes", f"ended {DEATHS} times before a job was done", FEWER)
 
 
 def _run_until_a_death(
@@ -119,7 +119,7 @@ def _run_until_a_death(
         except BrokenProcessPool:
             pool.shutdown(wait=True, cancel_futures=True)
             if any(worker.exitcode == UNGUARDED for worker in crew.workers):
-                raise WorkerError("worker processes", "each started the script again", GUARD) from None
+                raise WorkerError("worker processes", "each started the script again", f"use {GUARD}") from None
             raise
         finally:
             try:
@@ -192,8 +192,8 @@ def check_picklable(named: Mapping[str, Any], gains: Mapping[str, dict[str, Any]
         try:
             pickle.dumps((item, gains.get(name)))
         except Exception as error:  # pickling runs code of the policy's class
-            allowed = f"a picklable controller for several workers, or workers=1 ({error})"
-            raise OptionError(f"controller {name!r}", item, allowed) from error
+            problem = f"is not picklable, as it must be for several workers ({error})"
+            raise OptionError(f"controller {name!r}", item, "choose workers=1", problem) from error
 
 
 @contextlib.contextmanager

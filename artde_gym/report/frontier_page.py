@@ -37,7 +37,7 @@ def read_frontier(folder: Path) -> tuple[Frontier, dict[str, Any]]:
         half = parse_table(halves.read_text(encoding="utf-8"), ("controller",)) if halves.exists() else None
         varied, survival = Varied(**wanted["axis"]), wanted["survival"]
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise StoreError("frontier", str(folder), "a folder in which at least one level was finished") from error
+        raise StoreError("frontier", str(folder), "continue the frontier first", "has no finished level") from error
     return Frontier(table, levels, varied, survival, folder, bool(record.get("complete")), half), record
 
 
@@ -76,7 +76,7 @@ def parts(found: Frontier) -> list[str]:
 
 
 def survival_chart(found: Frontier, *, legend: bool = False) -> Chart:
-    """Draw the share of episodes without a fall over what is varied."""
+    """Draw the share of episodes without a fall over what is varied; a legend names each controller's margin."""
     axis = found.axis
     drawn = set(found.levels["controller"])
     shown = styles(name for row in _records(found.table) if (name := str(row["controller"])) in drawn)
@@ -97,7 +97,8 @@ def survival_chart(found: Frontier, *, legend: bool = False) -> Chart:
                 place, 100 * row["rate"], look, f"{name} at {row['value']:g}: {row['survived']}/{row['episodes']}"
             )
     if legend:
-        chart.legend(shown)
+        margins = {row["controller"]: value_text(row, axis.unit) for row in _records(found.table)}
+        chart.legend({f"{name}: {margins[name]}": look for name, look in shown.items()})
     return chart
 
 

@@ -16,7 +16,7 @@ import pybullet_data
 from artde_gym.errors import OptionError
 from artde_gym.multibody.spec import RobotSpec, Vector
 from artde_gym.multibody.urdf import urdf
-from artde_gym.sim.camera import Camera
+from artde_gym.sim.camera import WITHOUT_WINDOW, Camera
 from artde_gym.sim.engine import PAYLOAD_COLOR, PAYLOAD_LOOK, State
 from artde_gym.sim.ground import SUN
 from artde_gym.sim.pybullet_module import bullet
@@ -50,17 +50,15 @@ def require_window() -> None:
     """
     where = os.environ.get("DISPLAY")
     if not where:
-        raise OptionError(
-            "display", None, "a display with OpenGL 3 (DISPLAY is not set); `artde-gym video` works without one"
-        )
+        raise OptionError("display", None, WITHOUT_WINDOW, "cannot open a window (DISPLAY is not set)")
     try:
         done = subprocess.run([sys.executable, "-c", _PROBE], capture_output=True, text=True, timeout=PATIENCE)
     except subprocess.TimeoutExpired as error:
-        raise OptionError("display", where, f"a display on which a window opens within {PATIENCE:g} s") from error
+        raise OptionError("display", where, WITHOUT_WINDOW, f"opened no window within {PATIENCE:g} s") from error
     if done.returncode:
         said = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
         why = said[-1].strip() if said else f"exit code {done.returncode}"
-        raise OptionError("display", where, f"a display with OpenGL 3 ({why}); `artde-gym video` works without one")
+        raise OptionError("display", where, WITHOUT_WINDOW, f"has no OpenGL 3 ({why})")
 
 
 class BulletWindow:

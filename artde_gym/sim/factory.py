@@ -179,6 +179,5 @@ def make_batch(name: EngineName, spec: RobotSpec, n: int, time_step: float, thre
     """
     able = {one.name: one.vector_entry_point for one in ENGINES.values() if one.vector_entry_point is not None}
     if not isinstance(name, str) or name not in able:
-        without = f"; engine {name!r} has no batches: make single environments there" if name in ENGINES else ""
-        raise OptionError("engine", name, f"{', '.join(map(repr, able))}{without}")
+        raise OptionError("engine", name, f"{', '.join(map(repr, able))}; single environments have all engines")
     return ENGINES[name].load(able[name])(spec, n, time_step, threads)

@@ -25,9 +25,7 @@ from artde_gym.sim.engine import PAYLOAD_COLOR, PAYLOAD_LOOK
 mj: Any = mujoco  # compiled, without type information
 
 _LIBRARIES = {"egl": "libEGL.so.1", "osmesa": "libOSMesa.so.8"}
-_ALLOWED = (
-    "with OpenGL of EGL or OSMesa (Debian: apt install libegl1 libgl1-mesa-dri, or libosmesa6); or engine 'bullet'"
-)
+_INSTALL = "install EGL or OSMesa (Debian: apt install libegl1 libgl1-mesa-dri, or libosmesa6), or use engine 'bullet'"
 _MAX_SHAPES = 1000  # most shapes in a scene
 
 
@@ -90,8 +88,8 @@ def _context() -> Any:
         try:
             return importlib.import_module(f"mujoco.{name}").GLContext(1, 1)  # any size: it draws into its own buffer
         except (ImportError, AttributeError, RuntimeError) as error:
-            raise OptionError("render_mode", "rgb_array", f"{_ALLOWED}; {name} said: {error}") from error
-    raise OptionError("render_mode", "rgb_array", _ALLOWED)
+            raise OptionError("render_mode", "rgb_array", _INSTALL, f"needs OpenGL ({name}: {error})") from error
+    raise OptionError("render_mode", "rgb_array", _INSTALL, "needs OpenGL, which is missing")
 
 
 def _free(context: Any, painter: Any) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 from artde_gym.arrays import Array
 from artde_gym.errors import OptionError
 from artde_gym.multibody.spec import RobotSpec, Vector
-from artde_gym.sim.camera import FIELD_OF_VIEW, Camera
+from artde_gym.sim.camera import FIELD_OF_VIEW, WITHOUT_WINDOW, Camera
 from artde_gym.sim.engine import PAYLOAD_COLOR, PAYLOAD_LOOK, State
 from artde_gym.sim.mujoco_world import Blueprint
 
@@ -53,11 +53,7 @@ class MujocoWindow:
         self._window: Any = glfw.create_window(*SIZE, "artde-gym", None, None) if glfw.init() else None
         if self._window is None:
             why = errors[-1] if errors else "GLFW reports no reason"
-            raise OptionError(
-                "display",
-                os.environ.get("DISPLAY"),
-                f"a display with OpenGL ({why}); `artde-gym video` works without one",
-            )
+            raise OptionError("display", os.environ.get("DISPLAY"), WITHOUT_WINDOW, f"has no OpenGL ({why})")
         glfw.make_context_current(self._window)
         glfw.swap_interval(0)
         self._keys: deque[str] = deque()

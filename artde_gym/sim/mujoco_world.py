@@ -36,7 +36,9 @@ class Blueprint:
 
     def __init__(self, spec: RobotSpec, time_step: float) -> None:
         if spec.gears:
-            raise RobotError("gears", spec.gears, "none, rotors being armature; engine 'bullet' couples rotor links")
+            raise RobotError(
+                "gears", spec.gears, "use rotors as armature, or engine 'bullet'", "cannot be coupled here"
+            )
         self.spec = spec
         self.model = model = mj.MjModel.from_xml_string(mjcf(spec))
         model.opt.timestep = time_step

@@ -122,9 +122,8 @@ def _check_part(out: Path, cell: Cell, start: float, end: float, step: float) ->
         raise OptionError("start", start, f"up to the end of the episode, {duration:g} s")
     count = math.ceil((min(end, duration) - start) / step)
     if out.suffix != ".png" and count > MAX_FRAMES:
-        raise OptionError(
-            "number of pictures", count, f"at most {MAX_FRAMES}: shorten the part, raise the speed or lower the fps"
-        )
+        todo = "shorten the part, raise the speed or lower the fps"
+        raise OptionError("number of pictures", count, todo, f"is above {MAX_FRAMES}")
 
 
 def _times(start: float, end: float, step: float) -> Iterator[float]:

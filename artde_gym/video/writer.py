@@ -137,6 +137,6 @@ def _ffmpeg(out: Path) -> Any:
 
         imageio_ffmpeg.get_ffmpeg_exe()
     except (ImportError, RuntimeError) as error:
-        allowed = ".gif, .webp or .png, or install ffmpeg for other videos: pip install 'artde-gym[video]'"
-        raise OptionError("out", str(out), allowed) from error
+        todo = "pip install 'artde-gym[video]', or choose .gif, .webp or .png"
+        raise OptionError("out", str(out), todo, "needs ffmpeg") from error
     return imageio_ffmpeg

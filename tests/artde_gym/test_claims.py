@@ -16,6 +16,7 @@ from artde_gym.robots.ojas.thesis import JOINTS
 from artde_gym.robots.q450.thesis import ATTITUDE, POSITION, REPORTED
 from artde_gym.scenarios import SCENARIOS
 from artde_gym.studies.reproduce.claims import (
+    ADDED,
     CLAIMS,
     Claim,
     adapts,
@@ -218,7 +219,7 @@ def test_claims_of_ones_own_are_judged_with_the_others(monkeypatch: pytest.Monke
     len(CLAIMS)
     monkeypatch.setattr(CLAIMS, "_entries", dict(CLAIMS))
     before = all_claims()
-    mine = Claim("S1", "TDE never falls", "ours", falls("S1", {"tde": False}))
+    mine = Claim("S1", "TDE never falls", ADDED, falls("S1", {"tde": False}))
     register_claims("mine", [mine])
     assert all_claims() == (*before, mine)
     result = episodes({"tde": 1.0, "artde": 0.5}, scenario="S1")

@@ -189,7 +189,7 @@ def test_gains_reach_the_controller() -> None:
     [
         ({"controllers": ["tdee"]}, UnknownNameError, ["tdee", "did you mean 'tde'"]),
         ({"controllers": []}, OptionError, ["controllers"]),
-        ({"controllers": ["tde", "tde"]}, OptionError, ["tde", "once"]),
+        ({"controllers": ["tde", "tde"]}, OptionError, ["tde", "twice"]),
         ({"controllers": [3]}, OptionError, ["3", "predict"]),
         ({"scenario": "S9"}, UnknownNameError, ["S9", "S1-L4"]),
         ({"scenario": []}, OptionError, ["scenario"]),

@@ -135,7 +135,7 @@ def test_the_biped_is_tuned_too():
     ("names", "options", "error", "words"),
     [
         (["artd"], {}, UnknownNameError, "'artd'.*did you mean 'artde'"),
-        (["tde", "tde"], {}, OptionError, "each name once"),
+        (["tde", "tde"], {}, OptionError, "given twice"),
         ("tde", {}, OptionError, "a list of names"),
         ([], {}, OptionError, "a list of names"),
         (["tde+kd"], {}, UnknownNameError, "'q450' to be tuned is 'tde.kd'"),

@@ -35,11 +35,11 @@ def test_a_scenario_named_twice_is_refused(tmp_path: Path) -> None:
     ],
 )
 def test_a_controller_named_twice_is_refused(tmp_path: Path, controllers: Any) -> None:
-    with pytest.raises(OptionError, match="each name once"):
+    with pytest.raises(OptionError, match="is given twice"):
         evaluate(controllers, scenario="Q1", episodes=1)
-    with pytest.raises(OptionError, match="each name once"):
+    with pytest.raises(OptionError, match="is given twice"):
         frontier(controllers, "QuadInfinity-Payload-v0", "wind.scale", episodes=1)
-    with pytest.raises(OptionError, match="each name once"):
+    with pytest.raises(OptionError, match="is given twice"):
         video(controllers, tmp_path / "film.gif", scenario="Q1")
 
 
@@ -49,7 +49,7 @@ def test_a_name_is_a_word() -> None:
 
 
 def test_tune_refuses_a_controller_named_twice() -> None:
-    with pytest.raises(OptionError, match="each name once"):
+    with pytest.raises(OptionError, match="is given twice"):
         tune(["tde", "tde"], scenario="Q1", trials=1)
 
 

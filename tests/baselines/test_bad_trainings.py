@@ -37,7 +37,10 @@ def training(env: str = QUADROTOR, base: str = "tde", **more: Any) -> Training:
     ("arguments", "words"),
     [
         ({"base": "nope"}, "controller is 'nope'"),
-        ({"base": "tde+ppo", "options": {"n_steps": 8, "batch_size": 16}}, "base is 'tde[+]ppo'; allowed: a law"),
+        (
+            {"base": "tde+ppo", "options": {"n_steps": 8, "batch_size": 16}},
+            "base 'tde[+]ppo' is a trained policy.*choose a law",
+        ),
         ({"env_kwargs": {**SHORT, "engine": "mujoco"}}, "engine is 'mujoco'"),
         ({"env_kwargs": {**SHORT, "nope": 1}}, "argument of .* is 'nope'"),
         ({"env": BIPED, "env_kwargs": {**SHORT, "nope": 1}}, "argument of .* is 'nope'"),

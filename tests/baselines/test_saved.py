@@ -113,7 +113,7 @@ def test_a_pickle_is_refused_unread(folder, tmp_path, monkeypatch):
 def test_a_damaged_file_is_refused(folder):
     content = (folder / "weights.npz").read_bytes()
     (folder / "weights.npz").write_bytes(content[:-40])
-    with pytest.raises(PolicyFileError, match=r"weights is .*; allowed: the file that policy\.json was written with"):
+    with pytest.raises(PolicyFileError, match=r"weights '.*' do not belong to policy\.json"):
         baselines.load(folder)
     (folder / "weights.npz").write_bytes(content)
     (folder / "policy.json").write_text((folder / "policy.json").read_text()[:50])
@@ -138,9 +138,9 @@ def test_a_missing_array_or_another_shape_is_refused(folder):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"version": 99}, r"version of .* is 99; allowed: 1, what this release reads"),
-        ({"features_sha256": "0"}, r"what 'tde\+x' sees is '0'"),
-        ({"actions": ["x"]}, r"what 'tde\+x' does"),
+        ({"version": 99}, r"version of .* is 99; allowed: 1, which this release reads"),
+        ({"features_sha256": "0"}, r"features of 'tde\+x' '0' differ"),
+        ({"actions": ["x"]}, r"actions of 'tde\+x'"),
         ({"recipe": {"robot": "q450", "unknown": 1}}, "unknown"),
         ({"recipe": {"robot": "q450", "action_scale": -1.0}}, "action_scale"),
         ({"recipe": {"robot": "ojas"}}, r"nominal_robot is 'q450'"),
@@ -154,7 +154,7 @@ def test_what_does_not_fit_is_refused_by_name(folder, changes, message):
 
 def test_another_robot_is_refused(folder):
     biped = gym.make("BipedWalk-Payload-v0", disable_env_checker=True, duration=1.0, disturbances={})
-    with pytest.raises(PolicyFileError, match=r"robot of 'tde\+x' is 'q450'; allowed: 'ojas'"):
+    with pytest.raises(PolicyFileError, match=r"robot of 'tde\+x' 'q450' is not 'ojas'"):
         baselines.load(folder, biped)
     biped.close()
 

@@ -88,7 +88,11 @@ def test_fixed_arguments_of_a_users_controller_are_fixed(env, registry):
 @pytest.mark.parametrize(
     ("point", "error", "words"),
     [
-        ("no_such_module:make", UnknownNameError, "entry point of 'own' is 'no_such_module:make'.*No module named"),
+        (
+            "no_such_module:make",
+            UnknownNameError,
+            "entry point of 'own' 'no_such_module:make' cannot be imported.*No module named",
+        ),
         ("own_things:nothing", UnknownNameError, "'own_things:nothing'.*has no attribute"),
         ("own_things:number", UnknownNameError, "'own_things:number'.*function or class"),
         ("own_things:make_none", OptionError, "result of own_things:make_none is None.*`predict`"),
@@ -109,7 +113,7 @@ def test_what_is_no_controller_is_told_in_words(env, registry, tmp_path, point, 
 
 def test_a_search_space_that_cannot_be_imported_is_told_in_words(env, registry):
     artde_gym.register_controller("own", "own_things:make", tuning_space="no_such_module:space")
-    with pytest.raises(UnknownNameError, match="entry point of 'own' is 'no_such_module:space'"):
+    with pytest.raises(UnknownNameError, match="entry point of 'own' 'no_such_module:space' cannot be imported"):
         registration.tuning_space("own", env)
 
 

@@ -90,7 +90,7 @@ def test_without_a_load_the_swing_term_is_its_law_alone(name: str) -> None:
 
 @pytest.mark.parametrize("name", SLUNG)
 def test_a_law_for_a_cable_needs_one(name: str) -> None:
-    with gym.make("QuadInfinity-Payload-v0") as env, pytest.raises(OptionError, match=r"with a cable.*QuadSling"):
+    with gym.make("QuadInfinity-Payload-v0") as env, pytest.raises(OptionError, match=r"observes a cable.*QuadSling"):
         controllers.make(name, env)
 
 

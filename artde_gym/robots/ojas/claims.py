@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from artde_gym.robots.ojas.thesis import JOINTS
-from artde_gym.studies.reproduce.claims import Claim, adapts, falls, improves, outlasts, repeats, stays
+from artde_gym.studies.reproduce.claims import ADDED, Claim, adapts, falls, improves, outlasts, repeats, stays
 
 _FALL = {"tde": True, "atde": True, "artde": False}
 _WALK = {"tde": False, "atde": False, "artde": False}
@@ -80,7 +80,7 @@ CLAIMS: tuple[Claim, ...] = (
         Claim(
             f"{name}{suffix}",
             "adaptation improves on the equivalent extra stiffness (ARTDE against tde+kd)",
-            "ours",
+            ADDED,
             adapts(f"{name}{suffix}", "tde+kd", "rmse_deg"),
             ablation=True,
         )
@@ -91,7 +91,7 @@ CLAIMS: tuple[Claim, ...] = (
         Claim(
             f"{name}{suffix}",
             "ARTDE at the thesis' m_bar of 0.042 beats TDE at the preset stiff, 0.077",
-            "ours",
+            ADDED,
             adapts(f"{name}{suffix}", "tde-stiff", "rmse_deg"),
         )
         for suffix in _ALL

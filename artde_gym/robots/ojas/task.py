@@ -232,8 +232,8 @@ class Walk:
         """Parse disturbances of this robot."""
         parsed = Disturbances.parse(disturbances, self.words["site"], self.words["joint"], self.nominal_robot.name)
         if not any(self.nominal_robot.armature) and any(kind == "rotor_inertia" for kind, _ in parsed.entries):
-            allowed = "actuator_inertia='rotor' beside it: discs and bare links have no rotors"
-            raise DisturbanceError("disturbances", "rotor_inertia", allowed)
+            problem = "needs rotors, which discs and bare links have not"
+            raise DisturbanceError("disturbances", "rotor_inertia", "choose actuator_inertia='rotor'", problem)
         return parsed
 
     def set_up(self, world: World, sampled: Mapping[str, Any]) -> None:

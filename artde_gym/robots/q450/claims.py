@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from artde_gym.robots.q450.thesis import ATTITUDE, POSITION
-from artde_gym.studies.reproduce.claims import Claim, adapts, falls, improves, ordered, safer, settles
+from artde_gym.studies.reproduce.claims import ADDED, Claim, adapts, falls, improves, ordered, safer, settles
 
 CLAIMS: tuple[Claim, ...] = (
     Claim(
@@ -61,7 +61,7 @@ CLAIMS: tuple[Claim, ...] = (
         Claim(
             name,
             f"adaptation improves on {what} in wind (ARTDE against {rival})",
-            "ours",
+            ADDED,
             adapts(name, rival, "rmse_m"),
             ablation=rival == "tde+kd",
         )
@@ -71,7 +71,7 @@ CLAIMS: tuple[Claim, ...] = (
     Claim(
         "Q1-calm",
         "ARTDE is better than ATDE, and ATDE than TDE, also without wind",
-        "ours",
+        ADDED,
         ordered("Q1-calm", ("artde", "atde", "tde"), "rmse_m"),
     ),
     *(
@@ -81,25 +81,25 @@ CLAIMS: tuple[Claim, ...] = (
             Claim(
                 name,
                 "laws of the thesis lose more flights with a load on a cable than TDE with the swing term",
-                "ours",
+                ADDED,
                 safer(name, "tde+swing", ("tde", "atde", "artde")),
             ),
             Claim(
                 name,
                 "a kicked load settles under the swing term, and not under the laws of the thesis",
-                "ours",
+                ADDED,
                 settles(name, "recovery_time_s_push0_swing", {"tde+swing": True, "tde": False, "artde": False}),
             ),
             Claim(
                 name,
                 "the swing term needs no mass: its load error is below that of the control of the load, which knows it",
-                "ours",
+                ADDED,
                 ordered(name, ("tde+swing", "geometric-load"), "rms_load_error_m"),
             ),
             Claim(
                 name,
                 "adaptation adds once the swing is damped (error of the load, ARTDE against TDE, both with the term)",
-                "ours",
+                ADDED,
                 ordered(name, ("artde+swing", "tde+swing"), "rms_load_error_m"),
             ),
         )

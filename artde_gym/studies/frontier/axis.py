@@ -81,7 +81,7 @@ def placed(disturbances: Mapping[str, Any], kind: str, name: str, value: Any) ->
         return {**disturbances, kind: {**parameters_of(kind, given), name: value}}
     entries = [given] if isinstance(given, Mapping) else given
     if not (isinstance(entries, (list, tuple)) and entries and all(isinstance(entry, Mapping) for entry in entries)):
-        raise OptionError("disturbances", given, f"with a list of at least one {kind!r} to vary")
+        raise OptionError("disturbances", given, "add one, or vary another", f"have no {kind!r} to vary")
     return {**disturbances, kind: [{**entry, name: value} for entry in entries]}
 
 
@@ -109,7 +109,7 @@ def axis(
     for field, given in (("low", low), ("high", high), ("tolerance", tolerance)):
         value = given if given is not None or default is None else getattr(default, field)
         if value is None:
-            raise OptionError(field, None, f"a number: {path} has no default range")
+            raise OptionError(field, None, "give a number", f"is no number, and {path} has no default range")
         if isinstance(value, bool) or not (isinstance(value, (int, float)) and math.isfinite(value)):
             raise OptionError(field, value, "a finite number")
         ends[field] = float(value)

@@ -46,7 +46,9 @@ class Design:
         if disturbances is None:
             disturbances, arguments = standard_test(cell.env_id, axis.path, arguments, scenario)
         elif scenario is not None:
-            raise OptionError("disturbances", disturbances, "None, if a scenario brings them")
+            raise OptionError(
+                "disturbances", disturbances, "leave out one of them", f"come with scenario {scenario!r}, too"
+            )
         design = cls(axis, survival, disturbances, arguments)
         for end in (axis.levels[0], axis.levels[-1]):
             placed = design.at(end, cell)
@@ -72,4 +74,4 @@ def _check_arguments(env_id: str, vectorized: bool, axis: Axis, given: Mapping[s
         if name not in known:
             raise OptionError(f"argument of {env_id}", name, suggest_names(name, known))
         if axis.kind is None and name == axis.name:
-            raise OptionError("env_kwargs", name, "arguments that are not varied")
+            raise OptionError("argument in env_kwargs", name, "leave it out", "is varied")

@@ -20,7 +20,6 @@ The ground force of the thesis is a grid of its own: `vary="grf_pulse.magnitude"
 
     frontier.csv     one row per controller
     levels.csv       one row per tested level and controller
-    frontier.png     survival against the varied value
     half.csv         one row a controller, of a grid
     frontier.json    configuration and provenance, written before the first episode
     levels/<value>/  the results folder of each level, see `artde_gym.evaluation.store`
@@ -180,8 +179,6 @@ class _Levels:
         found = self._found(complete)
         if self._store is not None:
             self._store.write(found)
-            if self._rows:
-                self._store.draw(found)
         return found
 
     def _run_all(self) -> bool:

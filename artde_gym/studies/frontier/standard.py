@@ -37,7 +37,7 @@ def standard_test(
     """
     standard = standard_for(env_id)
     if standard is None:
-        raise OptionError("disturbances", None, f"a mapping: {env_id} has no standard test")
+        raise OptionError("env_id", env_id, "pass `disturbances`", "has no standard test")
     test = find_scenario(scenario or standard.scenario)
     if robot_of(test.env_id) != robot_of(env_id):
         raise OptionError("scenario", scenario, f"one of the robot in {env_id}")

@@ -36,11 +36,6 @@ class FrontierStore:
             write_atomically(self.path / name, lambda file, text=text: file.write(text.encode()))
         self._write_record(found)
 
-    def draw(self, found: Frontier) -> None:
-        from artde_gym.studies.frontier.figure import draw  # Matplotlib loads slowly: not at each start of a worker
-
-        write_atomically(self.path / "frontier.png", lambda file: draw(found, file))
-
     def abandon(self) -> None:
         """Give a folder back in which nothing was run, after an argument that `evaluate` refused."""
         if not self._begun:

@@ -186,7 +186,7 @@ def _fixed(given: Mapping[str, Any]) -> dict[str, Any]:
     for name, value in fixed.items():
         check_setting(name, value)
     if fixed["env"] is None and fixed["scenario"] is None:
-        raise OptionError("design", "neither env nor scenario", "one of them at least")
+        raise OptionError("design", list(given), "add one of them", "has neither env nor scenario")
     single = given.get("set", {})
     if not isinstance(single, Mapping):
         raise OptionError("set", single, "a mapping of paths to values")
@@ -208,7 +208,7 @@ def _controllers(given: Mapping[str, Any]) -> tuple[tuple[str, ...], str | None]
         if name not in known:
             raise UnknownNameError("controller", name, suggest_names(name, known))
     if again := canonical.twice(names):
-        raise OptionError("controllers", again, "each name once")
+        raise OptionError("controller", again, "give each name once", "is given twice")
     if matched is not None and matched not in names:
         raise OptionError("matched", matched, f"one of the controllers: {suggest_names(matched, names)}")
     return tuple(names), matched
@@ -219,7 +219,7 @@ def _factors(given: Any) -> tuple[Factor, ...]:
         raise OptionError("factors", given, "a mapping of names to factors, at least one")
     factors = tuple(Factor.of(name, content) for name, content in given.items())
     if again := canonical.twice(path for factor in factors for path in factor.paths):
-        raise OptionError("path", again, "set by one factor")
+        raise OptionError("path", again, "leave all but one", "is set by two factors")
     return factors
 
 

@@ -73,7 +73,7 @@ def run(job: Job, on_time: Callable[[float], None]) -> list[Episode]:
         return _run_batch(job, on_time) if job.task.vectorized else run_task(job.task, on_time)
     except ArtdeGymError as error:
         worlds = f"{job.task.controller} in world {', '.join(map(str, job.task.episodes))}"
-        raise type(error)(f"{error.field} ({worlds})", error.value, error.allowed) from error
+        raise error.within(worlds) from error
 
 
 def _run_batch(job: Job, on_time: Callable[[float], None]) -> list[Episode]:

@@ -122,7 +122,7 @@ class Multiverse:
         """Return an episode without what it has no value for."""
         rows = self.episodes[(self.episodes["world"] == world) & (self.episodes["controller"] == controller)]
         if rows.empty:
-            raise OptionError("world", f"{world} of {controller}", "one that has been run")
+            raise OptionError("world", world, "choose one that has been run", f"has no episode of {controller}")
         return {str(key): value for key, value in rows.iloc[0].items() if value is not None and value == value}
 
     def _command(self, world: int, rows: list[dict[str, Any]]) -> str:
@@ -150,7 +150,7 @@ def read_multiverse(folder: str | Path) -> Multiverse:
     folder = Path(folder)
     run = last_run(folder)
     if run is None:
-        raise StoreError("multiverse", str(folder), "a folder that `artde-gym multiverse` wrote")
+        raise StoreError("folder", str(folder), "choose one that `artde-gym multiverse` wrote", "holds no multiverse")
     episodes = read_sweep(folder)
     if "world" in episodes:
         episodes = episodes.astype({"world": np.int64})

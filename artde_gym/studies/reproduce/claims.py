@@ -25,6 +25,8 @@ from artde_gym.studies.frontier.half import half_difference, survival_table
 from artde_gym.studies.frontier.result import Frontier
 
 CLAIM_COLUMNS = ["scenario", "claim", "verdict", "measured", "thesis"]
+ADDED = "not in the thesis"
+"""Source of a claim that the publication does not make."""
 Outcome = Literal["holds", "does not hold", "undecided", "not measured"]
 
 
@@ -43,7 +45,7 @@ class Claim:
     Attributes:
         scenario: the scenario it concerns.
         text: the statement.
-        thesis: the publication's own number or observation; "ours" for an added question.
+        thesis: the publication's own number or observation; `ADDED` for a question of this project.
         judge: episodes -> verdict.
         ablation: whether it takes the ablation of `artde_gym.studies.reproduce.reproduction`.
         curve: what a grid of `frontier` varies, that `judge` is given in place of episodes in the scenario.

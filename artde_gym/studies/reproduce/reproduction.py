@@ -120,9 +120,10 @@ def reproduce(
         raise OptionError("scenarios", scenarios, f"at least one of the {robot}'s")
     names = list(kit_of(robot).reproduced[1] if controllers is None else controllers)
     if ABLATION in names:
-        raise OptionError("controllers", ABLATION, "other names; pass ablation=True to run it")
+        raise OptionError("controller", ABLATION, "pass ablation=True", "runs as the ablation, not by its name")
     if ablation and ADAPTIVE not in names:
-        raise OptionError("controllers", names, f"{ADAPTIVE!r} among them, from which the ablation takes its gain")
+        problem = f"lack {ADAPTIVE!r}, from which the ablation takes its gain"
+        raise OptionError("controllers", names, "add it, or pass ablation=False", problem)
     vectorized, engine = fastest_engine(find_scenario(chosen[0]).env_id, engine)
     plan = Plan.of(
         names,

@@ -159,7 +159,7 @@ def design(given: Mapping[str, Any]) -> Design:
     draws = [{_current_path(path): value for path, value in draw.items()} for draw in draws]
     for path, values in grid.items():
         if path in draws[0]:
-            raise OptionError("path", path, "either in the grid or in the sample")
+            raise OptionError("path", path, "keep one of them", "is in the grid and in the sample")
         for value in values:
             _check_at(path, value)
     for draw in draws:

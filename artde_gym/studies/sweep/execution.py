@@ -115,7 +115,7 @@ def _check_executor(executor: Any, address: Any) -> None:
         allowed = f"{known}; a physics engine is an argument of environments (env_kwargs)"
         raise OptionError("executor", executor, allowed)
     if address is not None and executor != "ray":
-        raise OptionError("address", address, "None without executor 'ray'")
+        raise OptionError("address", address, "pass executor='ray'", "is of no use without Ray")
     parquet.pyarrow()
     if address is not None:
         check_address(address)
@@ -153,7 +153,7 @@ def _run(task: Task, on_time: Callable[[float], None]) -> list[Episode]:
         return run_task(task, on_time)
     except ArtdeGymError as error:
         cell = f"{task.controller} with {task.gains}, {task.cell.env_id} with {task.cell.kwargs}, seeds {task.seeds}"
-        raise type(error)(f"{error.field} ({cell})", error.value, error.allowed) from error
+        raise error.within(cell) from error
 
 
 def refuse_others(plan: Design, store: SweepStore) -> None:
@@ -161,11 +161,9 @@ def refuse_others(plan: Design, store: SweepStore) -> None:
     cells = {point.id for point in plan.points}
     others = sum(cell not in cells or episode >= plan.episodes for cell, episode in store.done)
     if others:
-        allowed = (
-            f"a new folder, or a sweep with all episodes in this one: {others} of {len(store.done)} belong to "
-            "another one"
-        )
-        raise StoreError("sweep folder", str(store.folder), allowed)
+        problem = f"has {len(store.done)} episodes, and {others} of {len(store.done)} belong to another sweep"
+        todo = "choose a new folder, or a sweep with all of them"
+        raise StoreError("sweep folder", str(store.folder), todo, problem)
 
 
 def _check(plan: Design, points: Mapping[str, SweepCell], done: set[Key], on_progress: OnProgress | None) -> None:

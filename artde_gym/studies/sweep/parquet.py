@@ -59,7 +59,12 @@ def joined(first: Types, second: Types) -> Types:
     """
     for name in first.keys() & second.keys():
         if first[name] != second[name]:
-            raise StoreError(f"column {name}", f"{first[name]} and {second[name]}", "one type throughout a sweep")
+            raise StoreError(
+                f"column {name}",
+                f"{first[name]} and {second[name]}",
+                "use one type throughout a sweep",
+                "do not go together",
+            )
     return {**first, **second}
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from artde_gym.errors import MissingDependencyError, OptionError, WorkerError
 from artde_gym.evaluation.provenance import software
-from artde_gym.evaluation.workers import AHEAD, PATIENCE, Job, Runs, Work
+from artde_gym.evaluation.workers import AHEAD, FEWER, PATIENCE, Job, Runs, Work
 
 ANSWER_TIMEOUT_S = 4.0  # until a cluster has answered
 JOIN_TIMEOUT_S = 14.0  # until a process has joined it
@@ -84,8 +84,10 @@ def _connect(ray: Any, address: str | None, workers: int) -> None:
     except Exception as error:  # it raises these, too
         reason = " ".join(str(error).split())
         if address is None:
-            raise WorkerError("Ray", reason, "a machine on which it starts within 30 s") from error
-        raise OptionError("address", address, f"the address of a running Ray cluster ({reason})") from error
+            raise WorkerError("Ray", f"did not start ({reason})", "use executor='local'") from error
+        raise OptionError(
+            "address", address, "give that of a running Ray cluster", f"does not answer ({reason})"
+        ) from error
 
 
 def check_address(address: str) -> None:
@@ -107,9 +109,8 @@ def check_address(address: str) -> None:
     reasons = [_silence(one, int(port)) for one in hosts]
     reason = _refusal(address) if "" in reasons else reasons[-1]
     if reason:
-        raise OptionError(
-            "address", address, f"the address of a running Ray cluster that answers within 20 s ({reason})"
-        )
+        problem = f"is not that of a running Ray cluster that answers within 20 s ({reason})"
+        raise OptionError("address", address, "start one, or give another address", problem)
 
 
 def _refusal(address: str) -> str:
@@ -145,12 +146,12 @@ def _result(ray: Any, reference: Any) -> Any:
         raise error.cause from None
     except ray.exceptions.RayError as error:
         reason = str(error).strip().splitlines()[0]
-        raise WorkerError("Ray", reason, "workers that keep running; if memory is short, use fewer workers") from error
+        raise WorkerError("Ray", f"lost a worker ({reason})", FEWER) from error
 
 
 def _on_node(work: Work, job: Job, wanted: dict[str, str]) -> Any:
     """Run a job in a worker with the same software; other software could change the last bits of its results."""
     here = software()
     if here != wanted:
-        raise OptionError("software of a Ray node", here, repr(wanted))
+        raise OptionError("software of a Ray node", here, "install the same", f"differs from {wanted!r} here")
     return work(job, lambda *_: None)

@@ -200,8 +200,8 @@ class SweepStore:
         try:
             yield
         except OSError as error:
-            allowed = f"a writable one ({error}); its content is intact: re-run the command to resume"
-            raise StoreError("sweep folder", str(self.folder), allowed) from error
+            problem = f"is not writable ({error}), but its content is intact"
+            raise StoreError("sweep folder", str(self.folder), "re-run the command to resume", problem) from error
 
 
 def read_sweep(folder: str | Path) -> pd.DataFrame:
@@ -243,7 +243,7 @@ def _runs(folder: Path) -> list[dict[str, Any]] | None:
 
 
 def _unreadable(folder: Path) -> StoreError:
-    return StoreError("sweep folder", str(folder), f"a folder with a {RECORD} that can be read")
+    return StoreError("folder", str(folder), "choose a folder that `sweep` wrote", f"has no readable {RECORD}")
 
 
 def _read(path: Path) -> Any:
@@ -251,5 +251,5 @@ def _read(path: Path) -> Any:
         part = parquet.decode(path.read_bytes())
         return part.rename_columns([current_column(name) for name in part.column_names])
     except (OSError, ValueError) as error:
-        allowed = f"an intact file ({error}); re-run the sweep to set it aside and run its episodes again"
-        raise StoreError("part of a sweep", str(path), allowed) from error
+        todo = "re-run the sweep to set it aside and run its episodes again"
+        raise StoreError("part of a sweep", str(path), todo, f"is corrupt ({error})") from error

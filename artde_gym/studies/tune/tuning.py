@@ -150,7 +150,7 @@ def _names(controllers: Any) -> list[str]:
     names = labeled(controllers)
     for name, item in names.items():
         if name != item:
-            raise OptionError("controllers", item, "registered names; a policy object has its own gains")
+            raise OptionError("controllers", item, "registered names")
     if canonical.twice([*names, *(name + TUNED for name in names)]):
         raise OptionError("controllers", list(names), f"names that differ by more than {TUNED!r}")
     return list(names)

@@ -53,8 +53,8 @@ def bracket(tmp_path_factory):
 def training(tmp_path_factory):
     """As a training leaves it behind."""
     folder = tmp_path_factory.mktemp("training")
-    recipe = {"robot": "q450", "base": "tde", "channel": "attitude"}
-    configuration = {"env_id": "QuadInfinity-Payload-v0", "recipe": recipe, "algo": "ppo", "steps": 4000000, "seed": 0}
+    config = {"robot": "q450", "base": "tde", "action_mode": "attitude"}
+    configuration = {"env_id": "QuadInfinity-Payload-v0", "config": config, "algo": "ppo", "steps": 4000000, "seed": 0}
     (folder / "run.json").write_text(json.dumps({"configuration": configuration, "versions": {"numpy": "2"}}))
     rows = ["steps,score,fell,rmse_m", "1000000,-0.05,0.5,0.05", "2000000,-0.01,0,0.01", "3000000,-0.02,0.25,0.02"]
     (folder / "learning_curve.csv").write_text("\n".join(rows) + "\n")

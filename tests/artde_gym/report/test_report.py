@@ -199,7 +199,7 @@ def test_an_interrupted_run_has_a_report(walks, tmp_path):
 
 def test_a_folder_of_something_else_is_refused_in_one_line(tmp_path):
     for folder in (tmp_path, tmp_path / "missing"):
-        with pytest.raises(StoreError, match="results folder is"):
+        with pytest.raises(StoreError, match="results folder"):
             write_report(folder)
 
 
