@@ -33,9 +33,7 @@ def play(
         str, typer.Option("--controllers", "--controller", help="One name, or two to see side by side; see `list`.")
     ] = "artde",
     scenario: Annotated[str | None, typer.Option(help="Name; see `list`. Default: none, just --env.")] = None,
-    env: Annotated[
-        str | None, typer.Option(help="Environment id. Default: the scenario's, or a walk.")
-    ] = None,
+    env: Annotated[str | None, typer.Option(help="Environment id. Default: the scenario's, or a walk.")] = None,
     seed: Seed = 0,
     engine: Engine = None,
     disturbances: Disturbances = None,

@@ -65,6 +65,7 @@ class Game:
         self.period: float = plant.control_period
         self.able = {name: hasattr(plant, method) for name, method in _METHODS.items()}
         self.sites: list[str] = list(plant.words["site"])
+        self.payload: dict[str, Any] = {"mass": round(PAYLOAD_SHARE * plant.nominal_robot.mass, 2)}
         self.given = self._first_disturbances()
         self._reset()
 
@@ -113,20 +114,26 @@ class Game:
         return next((player for player in self.players if not player.over), self.players[0])
 
     def _reset(self) -> None:
+        begun = self._with_room()
         for player in self.players:
-            player.reset(episode_seed(self.seed, 0), self.given)
+            player.reset(episode_seed(self.seed, 0), begun)
         self._steps, self.time, self._wanted = 0, 0.0, 0.0
         self._pull: tuple[str, tuple[float, ...]] | None = None
         self._pulled = 0.0  # s, until when the force of a drag acts
-        self.record = Record(self.given)
-        plant = self.players[0].plant
-        sampled = plant.sampled_disturbances
+        self.record = Record(begun)
+        sampled = self.players[0].plant.sampled_disturbances
         self.scheduled = [push_text(entry) for entry in sampled.get("push", ())]
         if PAYLOAD in sampled:
-            self.payload = {key: sampled[PAYLOAD][key] for key in sampled[PAYLOAD] if not key.endswith("_time")}
-        elif not hasattr(self, "payload"):
-            self.payload = {"mass": round(PAYLOAD_SHARE * plant.nominal_robot.mass, 2)}
+            self.payload = {key: value for key, value in sampled[PAYLOAD].items() if not key.endswith("_time")}
         self.version += 1
+
+    def _with_room(self) -> dict[str, Any]:
+        """Return the disturbances with a payload that never appears where there is none.
+
+        One that is attached later then finds the robot settled as when the episode runs again.
+        """
+        room = {PAYLOAD: {**self.payload, "attach_time": 0.0, "detach_time": 0.0}} if self.able["attach"] else {}
+        return {**room, **self.given}
 
     def _restart(self, given: dict[str, Any]) -> None:
         """Begin anew with other disturbances; refused ones leave the old ones."""
@@ -180,7 +187,7 @@ class Game:
     def _site(self, order: Mapping[str, Any]) -> str:
         self._require("push")
         site = check_choice("site", order["site"], self.sites)
-        if site == PAYLOAD and PAYLOAD not in self.record.disturbances():
+        if site == PAYLOAD and not comes(self.leader.plant.sampled_disturbances.get(PAYLOAD)):
             raise OptionError("site", site, "a site of the robot itself: there is no payload")
         return site
 
@@ -287,6 +294,11 @@ ORDERS: dict[str, Callable[[Game, Mapping[str, Any]], None]] = {
     "compare": Game._compare,
 }
 """Name of an order -> what it does."""
+
+
+def comes(payload: Mapping[str, Any] | None) -> bool:
+    """Tell whether a sampled payload appears in its episode."""
+    return bool(payload) and payload["detach_time"] > payload["attach_time"]
 
 
 def _force(given: Any) -> tuple[float, ...]:

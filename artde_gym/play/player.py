@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -64,7 +65,9 @@ class Player:
         Raises:
             DisturbanceError: for disturbances that the environment refuses.
         """
-        self._observation, _ = self._env.reset(seed=seed, options={"disturbances": dict(disturbances)})
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", ".* can never happen")  # a payload, unless a person attaches one
+            self._observation, _ = self._env.reset(seed=seed, options={"disturbances": dict(disturbances)})
         self._state, self._first = None, True
         self.over, self.fall, self.fault, self.end, self.swapped = False, "", "", 0.0, False
 

@@ -51,19 +51,25 @@ class News(NamedTuple):
 class _Slot:
     """The latest news for one browser."""
 
-    def __init__(self) -> None:
-        self._changed, self._news = threading.Condition(), News()
+    def __init__(self, news: News) -> None:
+        self._changed, self._news, self._ended = threading.Condition(), news, False
 
     def put(self, news: News) -> None:
         with self._changed:
             self._news = news
             self._changed.notify()
 
-    def get(self, known: News) -> News:
-        """Wait for news other than those known, at most a second."""
+    def end(self) -> None:
+        """Let `get` return None from now on."""
         with self._changed:
-            self._changed.wait_for(lambda: self._news != known, 1.0)
-            return self._news
+            self._ended = True
+            self._changed.notify()
+
+    def get(self, known: News) -> News | None:
+        """Wait for news other than those known, and return them; None at the end."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._ended or self._news != known)
+            return None if self._ended else self._news
 
 
 class Server:
@@ -192,28 +198,23 @@ class Server:
 
     def _watch(self, connection: ServerConnection) -> None:
         """Send news to one browser until it leaves."""
-        slot = _Slot()
         with self._lock:
-            self._slots[connection] = slot
-            slot.put(self._news)
-        threading.Thread(target=self._listen, args=(connection,), daemon=True).start()
+            slot = self._slots[connection] = _Slot(self._news)
+        threading.Thread(target=self._listen, args=(connection, slot), daemon=True).start()
         known = News()
         try:
-            while True:
-                news = slot.get(known)
+            while (news := slot.get(known)) is not None:
                 for before, now in zip(known, news, strict=True):
                     if now != before and now:
                         connection.send(now)
                 known = news
-                if connection.close_code is not None:
-                    break
         except ConnectionClosed:
             pass
         finally:
             with self._lock:
                 del self._slots[connection]
 
-    def _listen(self, connection: ServerConnection) -> None:
+    def _listen(self, connection: ServerConnection, slot: _Slot) -> None:
         """Take orders of one browser; what is no JSON object ends its connection, as do too many of them."""
         try:
             for message in connection:
@@ -224,6 +225,8 @@ class Server:
             connection.close(1003, "orders are JSON objects")
         except queue.Full:
             connection.close(1008, "too many orders")
+        finally:
+            slot.end()
 
 
 def _order(message: str | bytes) -> Mapping[str, Any]:

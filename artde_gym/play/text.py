@@ -15,7 +15,7 @@ from artde_gym.motion.page import json_text
 from artde_gym.motion.scene import scene_of
 from artde_gym.palette import styles
 from artde_gym.play.conditions import condition_text, conditions_of
-from artde_gym.play.game import Game
+from artde_gym.play.game import Game, comes
 from artde_gym.play.player import Player
 from artde_gym.play.record import MAGNITUDE
 from artde_gym.registration import make_controller, registered_controllers
@@ -101,7 +101,7 @@ def _player_text(player: Player) -> dict[str, Any]:
 
 def _state(payload: Mapping[str, Any], time: float) -> str:
     """Return "none", "waiting", "held" or "dropped"."""
-    if not payload or payload["detach_time"] <= payload["attach_time"]:
+    if not comes(payload):
         return "none"
     if time < payload["attach_time"] - _EPS:
         return "waiting"
