@@ -32,7 +32,7 @@ PORT = 8765  # where it is free
 LARGEST_MESSAGE = 4096  # bytes, of a browser
 MOST_ORDERS = 256  # waiting; a browser that sends more is cut off
 MOST_BROWSERS = 8
-CLOSE_TIMEOUT = 2.0  # s, for a browser that does not answer at the end
+PATIENCE = 2.0  # s, with a browser that connects and asks for nothing, or does not answer at the end
 DISTURBANCES = "/disturbances.json"
 """Path of the file of what was done."""
 _quiet = logging.getLogger("artde_gym.play")
@@ -41,7 +41,7 @@ _quiet.propagate = False
 
 
 class News(NamedTuple):
-    """What browsers are told: first words, further words, poses."""
+    """News for browsers: first words, further words, poses."""
 
     start: str = ""
     told: str = ""
@@ -108,7 +108,8 @@ class Server:
                 process_request=self._admit,
                 compression=None,
                 max_size=LARGEST_MESSAGE,
-                close_timeout=CLOSE_TIMEOUT,
+                open_timeout=PATIENCE,
+                close_timeout=PATIENCE,
                 server_header=None,
                 logger=_quiet,
             )
