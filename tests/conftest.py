@@ -61,6 +61,7 @@ class Chromium:
             stderr=subprocess.DEVNULL,
         )
         self.errors: list[str] = []
+        self.own: tuple[str, ...] = ("file:", "data:")  # what a page may ask for
         self._count = 0
         self._socket = websocket.create_connection(self._page(), timeout=60, suppress_origin=True)
         for domain in ("Page", "Runtime", "Log", "Network"):
@@ -109,14 +110,17 @@ class Chromium:
                 self.errors.append(params["entry"]["text"])
         elif method == "Network.loadingFailed":
             self.errors.append(params["errorText"])
-        elif method == "Network.requestWillBeSent" and not params["request"]["url"].startswith(("file:", "data:")):
+        elif method == "Network.requestWillBeSent" and not params["request"]["url"].startswith(self.own):
             self.errors.append(f"asks for {params['request']['url']}")
 
     def open(self, path: Path, width: int = 1280, height: int = 900, *, dark: bool = False) -> None:
+        self.visit(path.resolve().as_uri(), width, height, dark=dark)
+
+    def visit(self, address: str, width: int = 1280, height: int = 900, *, dark: bool = False) -> None:
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         self.call("Emulation.setEmulatedMedia", features=[scheme])
-        self.call("Page.navigate", url=path.resolve().as_uri())
+        self.call("Page.navigate", url=address)
         while self.run("document.readyState") != "complete":
             time.sleep(0.05)
 

@@ -89,6 +89,34 @@ agent.step(np.ones(2))
 assert 0 < env.unwrapped._q[0] != plain.unwrapped._q[0]
 """
 
+PLAY = """
+import json
+import numpy as np
+from artde_gym.evaluation.plan import Plan
+from artde_gym.play.game import Game
+from artde_gym.play.text import start_text, told_text
+
+def game(disturbances):
+    return Game(Plan.of(["tde"], "TwoLinkArm-Swing-v0", disturbances=disturbances))
+
+played = game(None)
+about = json.loads(start_text(played))["start"]
+assert about["able"] == {"push": True, "drop": True, "attach": True}
+assert about["push"]["site"] == "tip" and about["joints"] == 2 and about["controllers"][0] == "artde"
+orders = [{"do": "drop"}, {"do": "payload", "on": False}, {"do": "attach", "mass": 0.4}]
+for order in [*orders, {"do": "push", "site": "tip", "force": [5, 0, 0]}]:
+    played.do(order)
+    assert played.refused == "", played.refused
+    played.advance(0.3)
+assert json.loads(told_text(played))["told"]["payload"] == "held"
+played.do({"do": "drop"})
+played.advance(0.2)
+again = game(played.record.disturbances())
+again.advance(played.time)
+assert again.frame() == played.frame()
+assert set(played.record.disturbances()) == {"payload", "push"}
+"""
+
 
 def install(folder: Path, groups: tuple[str, ...] = ("artde_gym.robots", "artde_gym.drives")) -> Path:
     """Write the metadata of an installation that brings some of the groups of entry points; returns its place."""
@@ -158,6 +186,10 @@ def test_without_a_drive_it_has_the_joint_space_laws_and_no_presets(tmp_path: Pa
 
 def test_a_residual_of_zero_is_the_base_and_any_other_accelerates_joints(tmp_path: Path) -> None:
     run(tmp_path, install(tmp_path), AGENT)
+
+
+def test_it_can_be_played_with(tmp_path: Path) -> None:
+    run(tmp_path, install(tmp_path), PLAY)
 
 
 def test_a_plug_in_that_cannot_be_imported_is_named(tmp_path: Path) -> None:

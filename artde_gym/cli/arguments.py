@@ -12,6 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
+from artde_gym.arguments import wrap_read_errors
 from artde_gym.errors import OptionError
 from artde_gym.sim.factory import ENGINES
 
@@ -28,7 +29,7 @@ Vectorized = Annotated[
 Backend = Annotated[str | None, typer.Option(hidden=True)]
 """Deprecated form of `--vectorized`."""
 Engine = Annotated[str | None, typer.Option(help=f"Physics engine: {' or '.join(ENGINES)}. Default: see `doctor`.")]
-Disturbances = Annotated[str | None, typer.Option(help="JSON; override the scenario's disturbances.")]
+Disturbances = Annotated[str | None, typer.Option(help="JSON, or a .json file; override the scenario's disturbances.")]
 EnvKwargs = Annotated[str | None, typer.Option(help="JSON; arguments of the environment.")]
 Gains = Annotated[str | None, typer.Option(help='JSON; gains by controller, e.g. {"artde": {"gamma_0": 200}}.')]
 AllowMixed = Annotated[
@@ -91,6 +92,18 @@ def json_object(option: str, text: str | None) -> dict[str, Any]:
 def optional_json(option: str, text: str | None) -> dict[str, Any] | None:
     """Parse a JSON object; None without text, since an empty object has a meaning."""
     return None if text is None else json_object(option, text)
+
+
+def given_disturbances(text: str | None) -> dict[str, Any] | None:
+    """Return the disturbances of `--disturbances`, JSON or the name of a file of it; None without any.
+
+    Raises:
+        OptionError: if it is no JSON object, or the file cannot be read.
+    """
+    if text is not None and text.endswith(".json"):
+        with wrap_read_errors("--disturbances", Path(text), "JSON, or a .json file of it", OptionError):
+            text = Path(text).read_text(encoding="utf-8")
+    return optional_json("--disturbances", text)
 
 
 def environment_kwargs(text: str | None, engine: str | None) -> dict[str, Any]:

@@ -1,57 +1,97 @@
-"""`artde-gym play`: live simulation with user interaction."""
+"""`artde-gym play`: live simulation in a browser."""
 
 from __future__ import annotations
 
-import json
-from typing import Annotated
+import os
+import socket
+import sys
+import webbrowser
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from artde_gym.arguments import check_integer
 from artde_gym.cli.arguments import (
-    WALK,
     Disturbances,
     Engine,
     EnvKwargs,
     Gains,
     Seed,
     environment_kwargs,
+    given_disturbances,
     json_object,
-    optional_json,
+    names,
 )
-from artde_gym.errors import OptionError
-from artde_gym.registration import make_controller
+from artde_gym.cli.display import terminal
+from artde_gym.errors import MissingDependencyError, OptionError
+
+if TYPE_CHECKING:
+    from artde_gym.play.server import Server
 
 
 def play(
-    controller: Annotated[str, typer.Option(help="Name; see `list`.")] = "artde",
+    controllers: Annotated[
+        str, typer.Option("--controllers", "--controller", help="One name, or two to see side by side; see `list`.")
+    ] = "artde",
     scenario: Annotated[str | None, typer.Option(help="Name; see `list`. Default: none, just --env.")] = None,
-    env: Annotated[str | None, typer.Option(help=f"Environment id. Default: the scenario's, or {WALK}.")] = None,
+    env: Annotated[str | None, typer.Option(help="Environment id. Default: the scenario's, or a walk.")] = None,
     seed: Seed = 0,
     engine: Engine = None,
     disturbances: Disturbances = None,
     env_kwargs: EnvKwargs = None,
     gains: Gains = None,
+    port: Annotated[int | None, typer.Option(help="Port. Default: 8765, or another one that is free.")] = None,
+    host: Annotated[
+        str, typer.Option(help="Address to listen at; any but a loopback address lets other machines in.")
+    ] = "127.0.0.1",
+    browser: Annotated[bool, typer.Option(help="Open a browser, where there is one.")] = True,
 ) -> None:
-    """Watch a controller live in a window; push the robot and drop its payload with keys or the mouse."""
-    from artde_gym.evaluation.cells import cells_of  # only when asked for
-    from artde_gym.evaluation.environments import single
-    from artde_gym.play import HELP, Session
-    from artde_gym.sim.window import open_window
-
-    check_integer("seed", seed, 0)
-    kwargs, overrides = environment_kwargs(env_kwargs, engine), json_object("--gains", gains)
-    (cell,) = cells_of(env, scenario, kwargs, optional_json("--disturbances", disturbances))
-    window = open_window()
+    """Watch controllers live in a browser: push the robot, drop its payload, change gains, and save what you did."""
     try:
-        plant = single(cell.env_id, json.dumps(cell.kwargs))
-        if not hasattr(plant.unwrapped, "engine"):
-            raise OptionError(
-                "env", cell.env_id, "choose one that has", "has no physics engine that a window could show"
-            )
-        policy = make_controller(controller, plant, **overrides)
-        window.load(plant.unwrapped.engine.spec)
-        print("\n".join((*HELP, "A click pushes away from the viewer, at the nearest site of the robot.")))
-        Session(plant, policy, window, controller, seed).run()
+        from artde_gym.play.server import Server  # only when asked for
+    except ModuleNotFoundError as error:
+        raise MissingDependencyError("package", "websockets", "pip install 'artde-gym[play]'") from error
+    from artde_gym.evaluation.plan import Plan
+    from artde_gym.play.game import Game
+    from artde_gym.play.loop import run
+
+    if port is not None and not 0 <= port <= 65535:
+        raise OptionError("--port", port, "0 to 65535")
+    plan = Plan.of(
+        names(controllers),
+        env,
+        scenario=scenario,
+        seed=seed,
+        disturbances=given_disturbances(disturbances),
+        env_kwargs=environment_kwargs(env_kwargs, engine),
+        gains=json_object("--gains", gains),
+    )
+    server = Server(host, port)
+    try:
+        _announce(server, browser)
+        run(Game(plan), server)
+    except KeyboardInterrupt:
+        pass
     finally:
-        window.close()
+        server.close()
+
+
+def _announce(server: Server, browser: bool) -> None:
+    """Open a browser or say what to open; the page says that the simulation is being prepared."""
+    console = terminal()
+    console.print(f"Live play: {server.address}", soft_wrap=True, highlight=False, markup=False)
+    if not server.loopback:
+        console.print("Whoever has this address can play along: it is open to other machines, and is not encrypted.")
+    if browser and _has_display() and webbrowser.open(server.address):
+        console.print("Opened in a browser. Ctrl-C ends it.")
+        return
+    if server.loopback:
+        forward = f"ssh -L {server.port}:127.0.0.1:{server.port} {socket.gethostname()}"
+        console.print(f"From another machine: {forward}\nthen open the address there.", soft_wrap=True, highlight=False)
+    console.print("Ctrl-C ends it.")
+
+
+def _has_display() -> bool:
+    """Tell whether a browser would open in front of the user, not in the terminal or on another machine."""
+    if sys.platform in ("darwin", "win32"):
+        return "SSH_CONNECTION" not in os.environ
+    return any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))

@@ -15,9 +15,9 @@ from artde_gym.cli.arguments import (
     Gains,
     Seed,
     environment_kwargs,
+    given_disturbances,
     json_object,
     names,
-    optional_json,
 )
 from artde_gym.cli.display import terminal, words
 from artde_gym.errors import OptionError
@@ -63,7 +63,7 @@ def replay(
                 scenario=scenario,
                 seed=seed,
                 episode=episode or 0,
-                disturbances=optional_json("--disturbances", disturbances),
+                disturbances=given_disturbances(disturbances),
                 env_kwargs=environment_kwargs(env_kwargs, engine),
                 gains=json_object("--gains", gains),
                 on_progress=told,

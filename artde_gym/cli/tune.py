@@ -20,8 +20,8 @@ from artde_gym.cli.arguments import (
     Workers,
     environment_kwargs,
     folder_of,
+    given_disturbances,
     names,
-    optional_json,
     processes,
     vectorized_by,
 )
@@ -65,7 +65,7 @@ def tune(
             seed=seed,
             workers=processes(workers),
             out=folder_of(out),
-            disturbances=optional_json("--disturbances", disturbances),
+            disturbances=given_disturbances(disturbances),
             env_kwargs=kwargs,
             vectorized=vectorized_by(vectorized, backend),
             allow_mixed=allow_mixed,

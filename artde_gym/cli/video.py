@@ -18,9 +18,9 @@ from artde_gym.cli.arguments import (
     Gains,
     Seed,
     environment_kwargs,
+    given_disturbances,
     json_object,
     names,
-    optional_json,
 )
 from artde_gym.cli.display import terminal, words
 
@@ -63,7 +63,7 @@ def video(
             fps=fps,
             width=width,
             columns=columns,
-            disturbances=optional_json("--disturbances", disturbances),
+            disturbances=given_disturbances(disturbances),
             env_kwargs=environment_kwargs(env_kwargs, engine),
             gains=json_object("--gains", gains),
             on_progress=lambda time: bar.update(shown, description=f"{time:.1f} s simulated"),

@@ -38,10 +38,15 @@ class Push(NamedTuple):
     @classmethod
     def of(cls, entry: Mapping[str, Any], time_step: float) -> Push:
         """Convert a sampled push to steps of `time_step` (s)."""
-        direction = np.asarray(entry["direction"])
-        x, y, z = (entry["magnitude"] * direction / np.linalg.norm(direction)).tolist()
         first = round(entry["start"] / time_step)
-        return cls(entry["body"], (x, y, z), first, first + max(1, round(entry["duration"] / time_step)))
+        return cls(entry["body"], force_of(entry), first, first + max(1, round(entry["duration"] / time_step)))
+
+
+def force_of(entry: Mapping[str, Any]) -> Vector:
+    """Return the force (N, world axes) of a sampled push."""
+    direction = np.asarray(entry["direction"], np.float64)
+    x, y, z = (entry["magnitude"] * direction / np.linalg.norm(direction)).tolist()
+    return x, y, z
 
 
 class Schedule:
@@ -68,6 +73,15 @@ class Schedule:
         """Add a push to the sampled ones."""
         self._announce(push)
         self._pushes.append(push)
+
+    def attach(self, step: int, payload: Mapping[str, Any]) -> bool:
+        """Attach a sampled payload at a step, until its `detach_time`; return False if the episode has one already."""
+        if self._payload.get("detach_time", 0.0) > self._payload.get("attach_time", 0.0):
+            return False
+        self._payload = {**payload, "attach_time": step * self._time_step}
+        self._add(step, ATTACHED)
+        self._add(round(self._payload["detach_time"] / self._time_step), DROPPED)
+        return True
 
     def drop(self, step: int) -> bool:
         """Drop the payload at a step instead of later; return False if it is not attached then."""

@@ -1,14 +1,11 @@
-"""Checks of rendering, display, ffmpeg and Chromium, which results do not need."""
+"""Checks of rendering, ffmpeg and Chromium, which results do not need."""
 
 from __future__ import annotations
 
-import ctypes
 import importlib
 import importlib.util
-import os
 import shutil
 import subprocess
-import sys
 from typing import Any
 
 import gymnasium as gym
@@ -22,9 +19,9 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
 def pictures() -> list[CheckResult]:
-    """Check rendering, display, ffmpeg and Chromium."""
+    """Check rendering, ffmpeg and Chromium."""
     drawn = [_picture(name, engine.title) for name, engine in ENGINES.items()]
-    return [*drawn, _display(), _ffmpeg(), _browser()]
+    return [*drawn, _ffmpeg(), _browser()]
 
 
 def _picture(engine: str, written: str) -> CheckResult:
@@ -42,26 +39,6 @@ def _picture(engine: str, written: str) -> CheckResult:
         return CheckResult(what, "missing", "no OpenGL without a display", str(error.allowed))
     height, width, _ = picture.shape
     return CheckResult(what, "ok", f"{width} x {height}, without a display")
-
-
-def _display() -> CheckResult:
-    """Check for a responding X server: without one, opening Bullet's window ends the interpreter."""
-    remedy = "only live windows need a display: work at a desktop or with `ssh -X`; pictures and videos work without"
-    if sys.platform != "linux":
-        return CheckResult("display", "ok", "the window system's")
-    name = os.environ.get("DISPLAY")
-    if not name:
-        return CheckResult("display", "missing", "none", remedy)
-    try:
-        x11 = ctypes.CDLL("libX11.so.6")
-    except OSError:
-        return CheckResult("display", "missing", f"{name}, but no libX11", "apt install libx11-6")
-    x11.XOpenDisplay.restype = ctypes.c_void_p
-    server = x11.XOpenDisplay(None)
-    if not server:
-        return CheckResult("display", "missing", f"{name} does not answer", remedy)
-    x11.XCloseDisplay(ctypes.c_void_p(server))
-    return CheckResult("display", "ok", name)
 
 
 def _ffmpeg() -> CheckResult:

@@ -7,6 +7,9 @@ import copy
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
+import numpy as np
+
+from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.numeric import Words, numeric
 from artde_gym.disturbances.schedule import Push, Schedule
 from artde_gym.envs.closed_env import CLOSED, require_open
@@ -25,6 +28,7 @@ class InteractiveMixin(StepLimitMixin, abc.ABC):
     _engine: Engine
     _sampled: Mapping[str, Any]
     words: Words
+    robot_name: ClassVar[str]
     fall_reasons: ClassVar[Sequence[str]]
 
     def __copy__(self) -> Self:
@@ -57,6 +61,20 @@ class InteractiveMixin(StepLimitMixin, abc.ABC):
             raise RobotError("site", site, ", ".join(map(repr, sites)))
         first, steps = self.elapsed, max(1, round(duration / self._engine.time_step))
         self.schedule.add(Push(site, force, first, first + steps))
+
+    def add_payload(self, payload: Mapping[str, Any]) -> bool:
+        """Attach a payload now, in numbers of the grammar of disturbances; return False if the episode had one.
+
+        Raises:
+            DisturbanceError: for a payload that the robot cannot carry.
+        """
+        given = {"payload": {**payload, "attach_time": self.elapsed * self._engine.time_step}}
+        parsed = Disturbances.parse(given, self.words["site"], self.words["joint"], self.robot_name)
+        sampled = parsed.sample(np.random.default_rng(0))
+        added = self.schedule.attach(self.elapsed, sampled["payload"])
+        if added:
+            self._sample({**self._sampled, **sampled})
+        return added
 
     def drop_payload(self) -> bool:
         """Drop the payload now; return False if there is none."""

@@ -109,6 +109,15 @@ def single(env_id: str, arguments: str) -> Any:
     Raises:
         OptionError: for an unknown argument, or one that the environment rejects.
     """
+    return separate(env_id, arguments)
+
+
+def separate(env_id: str, arguments: str) -> Any:
+    """Build an environment as `single`, for one user alone.
+
+    Raises:
+        OptionError: as for `single`.
+    """
     return gym.make(env_id, disable_env_checker=True, **_checked(env_id, arguments, False))
 
 

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from artde_gym.arrays import Array
+from artde_gym.disturbances.schedule import force_of
 from artde_gym.errors import OptionError
 from artde_gym.evaluation.cells import Cell, single_of
 from artde_gym.evaluation.gains import policy_for
@@ -124,7 +125,7 @@ def text_of(take: Take, tracking: MetricsSpec, color: str) -> dict[str, Any]:
         "hook": _hook(take),
         "pushes": list(_pushes(take)),
         "events": [[time, text] for time, text in _payload_events(take) if time <= row["duration_s"]],
-        "series": [_plotted(label, take.traces["time"], values) for label, values in _signals(take, tracking)],
+        "series": [_plotted(label, take.traces["time"], values) for label, values in signals_of(take.traces, tracking)],
     }
 
 
@@ -136,12 +137,10 @@ def _hook(take: Take) -> list[float] | None:
 
 def _pushes(take: Take) -> Iterable[dict[str, Any]]:
     for push in take.disturbances.get("push", ()):
-        direction = np.asarray(push["direction"], np.float64)
-        force = push["magnitude"] * direction / np.linalg.norm(direction)
         start = push["start"]
         if start <= take.row["duration_s"] and push["magnitude"]:
             end = start + push["duration"]
-            yield {"site": push["body"], "force": np.round(force, 3).tolist(), "start": start, "end": end}
+            yield {"site": push["body"], "force": np.round(force_of(push), 3).tolist(), "start": start, "end": end}
 
 
 def _payload_events(take: Take) -> Iterable[tuple[float, str]]:
@@ -154,16 +153,30 @@ def _payload_events(take: Take) -> Iterable[tuple[float, str]]:
             yield payload["detach_time"], f"{what} dropped"
 
 
-def _signals(take: Take, tracking: MetricsSpec) -> Iterable[tuple[str, Array]]:
+def signals_of(fields: Mapping[str, Array], tracking: MetricsSpec) -> Iterable[tuple[str, Array]]:
     """Sizes over time: each tracked error, each effort, and gains of the policy that are reported as means."""
-    fields = take.traces
     for place, tracked in enumerate(tracking.errors):
-        yield f"error ({tracked.unit})", _error(fields, tracked, tracking.norm or place > 0)
+        yield error_label(tracked), _error(fields, tracked, tracking.norm or place > 0)
     for effort in tracking.efforts:
-        yield f"{effort.name}, largest ({SYMBOLS.get(effort.unit, effort.unit)})", _largest(fields, effort)
+        yield effort_label(effort), _largest(fields, effort)
     for column, diagnostic in tracking.diagnostic_means.items():
         if INSIDE + diagnostic in fields:
-            yield column.replace("_mean", "").replace("_", " "), _size(fields[INSIDE + diagnostic])
+            yield gain_label(column), _size(fields[INSIDE + diagnostic])
+
+
+def error_label(tracked: TrackedSignal) -> str:
+    """Return the label of an error."""
+    return f"error ({tracked.unit})"
+
+
+def effort_label(effort: EffortSignal) -> str:
+    """Return the label of an effort."""
+    return f"{effort.name}, largest ({SYMBOLS.get(effort.unit, effort.unit)})"
+
+
+def gain_label(column: str) -> str:
+    """Return the label of a gain that is reported as a mean in a column."""
+    return column.replace("_mean", "").replace("_", " ")
 
 
 def _error(fields: Mapping[str, Array], tracked: TrackedSignal, norm: bool) -> Array:

@@ -63,13 +63,18 @@ def test_each_command_refuses_an_engine_that_is_missing(
         ("optuna", ["tune", *IN_ENGINES["tune"]], "tune"),
         ("yaml", ["sweep", "sweep.yaml", "--out", "out"], "sweep"),
         ("pyarrow", ["sweep", "sweep.yaml", "--out", "out"], "sweep"),
+        ("websockets", ["play", *FLIGHT], "play"),
         ("imageio_ffmpeg", ["video", *FLIGHT, "--controllers", "tde", "--out", "out.mp4"], "video"),
     ],
 )
 def test_each_command_says_which_extra_it_needs(
     package: str, words: list[str], extra: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    for name in [name for name in sys.modules if name.startswith(("baselines.t", "artde_gym.studies.sweep.yaml12"))]:
+    for name in [
+        name
+        for name in sys.modules
+        if name.startswith(("baselines.t", "artde_gym.studies.sweep.yaml12", "websockets", "artde_gym.play."))
+    ]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, package, None)
     error = refusal(words)

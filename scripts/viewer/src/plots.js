@@ -13,6 +13,34 @@ export async function plotsOf(runs, seek) {
   }));
 }
 
+/** Begin a chart from one time to another and up to a value; null where it has no room. Clipped until `g.restore()`. */
+export function axes(canvas, from, to, high, spans, ink) {
+  const scale = Math.min(2, devicePixelRatio), width = canvas.clientWidth, height = canvas.clientHeight;
+  if (!width) return null;
+  if (canvas.width !== Math.round(width * scale)) { canvas.width = Math.round(width * scale); canvas.height = Math.round(height * scale); }
+  const g = canvas.getContext("2d"), span = to - from, x = (t) => LEFT + ((t - from) / span) * (width - LEFT - RIGHT), y = (v) => height - BOTTOM - (v / high) * (height - BOTTOM - 6);
+  g.setTransform(scale, 0, 0, scale, 0, 0);
+  g.clearRect(0, 0, width, height);
+  Object.assign(g, { font: "11px system-ui, sans-serif", fillStyle: ink("--soft"), textAlign: "right", strokeStyle: ink("--line"), lineWidth: 1 });
+  const step = roundStep(high, 3);
+  for (let v = 0; v <= high; v += step) { g.beginPath(); g.moveTo(LEFT, y(v)); g.lineTo(width - RIGHT, y(v)); g.stroke(); g.fillText(String(Number(v.toPrecision(6))), LEFT - 5, y(v) + 4); }
+  g.textAlign = "center";
+  const second = roundStep(span, Math.max(2, width / 70)), first = Math.ceil(from / second - 1e-9) * second;
+  for (let t = first; t <= to - 0.4 * second; t += second) g.fillText(`${Number(t.toPrecision(4))}${t === first ? " s" : ""}`, x(t), height - 3);
+  g.save(); g.beginPath(); g.rect(LEFT, 0, width - LEFT - RIGHT, height - BOTTOM + 1); g.clip();
+  g.fillStyle = ink("--push"); g.globalAlpha = 0.16;
+  for (const [begin, end] of spans) g.fillRect(x(begin), 0, Math.max(2, x(end) - x(begin)), height - BOTTOM);
+  g.globalAlpha = 1;
+  return { g, x, y, height };
+}
+
+/** Draw values over the times that `time(i)` gives. */
+export function line({ g, x, y }, color, values, time) {
+  g.strokeStyle = color; g.lineWidth = 1.4; g.beginPath();
+  values.forEach((v, i) => (i ? g.lineTo(x(time(i)), y(v)) : g.moveTo(x(time(i)), y(v))));
+  g.stroke();
+}
+
 class Plot {
   constructor(label, lines, seek) {
     this.label = label; this.lines = lines;
@@ -28,28 +56,11 @@ class Plot {
     this.canvas.onpointermove = (event) => { if (event.buttons & 1) go(event); };
   }
   draw(time, length, spans, ink) {
-    const { canvas, high } = this, scale = Math.min(2, devicePixelRatio), width = canvas.clientWidth, height = canvas.clientHeight;
+    const { high } = this, view = axes(this.canvas, 0, length, high, spans, ink);
     this.length = length;
-    if (!width) return;
-    if (canvas.width !== Math.round(width * scale)) { canvas.width = Math.round(width * scale); canvas.height = Math.round(height * scale); }
-    const g = canvas.getContext("2d"), x = (t) => LEFT + (t / length) * (width - LEFT - RIGHT), y = (v) => height - BOTTOM - (v / high) * (height - BOTTOM - 6);
-    g.setTransform(scale, 0, 0, scale, 0, 0);
-    g.clearRect(0, 0, width, height);
-    Object.assign(g, { font: "11px system-ui, sans-serif", fillStyle: ink("--soft"), textAlign: "right", strokeStyle: ink("--line"), lineWidth: 1 });
-    const step = roundStep(high, 3);
-    for (let v = 0; v <= high; v += step) { g.beginPath(); g.moveTo(LEFT, y(v)); g.lineTo(width - RIGHT, y(v)); g.stroke(); g.fillText(String(Number(v.toPrecision(6))), LEFT - 5, y(v) + 4); }
-    g.textAlign = "center";
-    const second = roundStep(length, Math.max(2, width / 70));
-    for (let t = 0; t <= length - 0.4 * second; t += second) g.fillText(`${Number(t.toPrecision(4))}${t === 0 ? " s" : ""}`, x(t), height - 3);
-    g.save(); g.beginPath(); g.rect(LEFT, 0, width - LEFT - RIGHT, height - BOTTOM + 1); g.clip();
-    g.fillStyle = ink("--push"); g.globalAlpha = 0.16;
-    for (const [begin, end] of spans) g.fillRect(x(begin), 0, Math.max(2, x(end) - x(begin)), height - BOTTOM);
-    g.globalAlpha = 1;
-    for (const { run, period, values } of this.lines.toReversed()) {
-      g.strokeStyle = lifted(run.color); g.lineWidth = 1.4; g.beginPath();
-      values.forEach((v, i) => (i ? g.lineTo(x(i * period), y(v)) : g.moveTo(x(0), y(v))));
-      g.stroke();
-    }
+    if (!view) return;
+    const { g, x, y, height } = view;
+    for (const { run, period, values } of this.lines.toReversed()) line(view, lifted(run.color), values, (i) => i * period);
     g.strokeStyle = ink("--ink"); g.lineWidth = 1; g.beginPath(); g.moveTo(x(time), 0); g.lineTo(x(time), height - BOTTOM); g.stroke();
     for (const { run, period, values } of this.lines.toReversed()) {
       const v = values[Math.round(time / period)];

@@ -108,6 +108,11 @@ export class Robot extends Group {
   }
   /** A place [body, x, y, z] in the world. */
   point([body, x, y, z]) { return new Vector3(x, y, z).applyMatrix4(this.bodies[body].matrixWorld); }
+  /** A site's place in the world; null for a payload that is not there. */
+  site(name) {
+    if (name in this.scene.sites) return this.point(this.scene.sites[name]);
+    return this.ball.visible ? this.ball.position.clone() : null;
+  }
   dispose() {
     this.traverse((node) => { node.geometry?.dispose(); node.material?.dispose(); });
   }

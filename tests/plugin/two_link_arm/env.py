@@ -9,7 +9,7 @@ from PIL import Image, ImageDraw
 from artde_gym.arguments import action_array
 from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.numeric import numeric
-from artde_gym.disturbances.schedule import Schedule
+from artde_gym.disturbances.schedule import Push, Schedule
 from artde_gym.info import EpisodeInfo
 from artde_gym.layout import Field, Layout
 from artde_gym.metrics_spec import EffortSignal, MetricsSpec, TrackedSignal
@@ -103,6 +103,24 @@ class TwoLinkArmEnv(gym.Env):
         x, z = self.nominal_robot.points(self._q)[2]
         payload = (x, 0.0, HEIGHT + z) if self._arm.payload else None
         return Pose((0.0, 0.0, HEIGHT), (0.0, 0.0, 0.0, 1.0), self._q, payload)
+
+    def push(self, site, force, duration):
+        """Push the tip now, for live play, as the two methods below."""
+        self._schedule.add(Push(site, force, self._step, self._step + round(duration / TIME_STEP)))
+
+    def add_payload(self, payload):
+        """Attach a payload now; return False if the episode had one."""
+        given = self._parsed({"payload": {**payload, "attach_time": self._time}}).sample(self.np_random)
+        added = self._schedule.attach(self._step, given["payload"])
+        self.sampled_disturbances |= given if added else {}
+        return added
+
+    def drop_payload(self):
+        """Drop the payload now; return False if there is none."""
+        dropped = self._schedule.drop(self._step)
+        if dropped:
+            self.sampled_disturbances["payload"]["detach_time"] = self._time
+        return dropped
 
     def _parsed(self, disturbances):
         return Disturbances.parse(disturbances, self.words["site"], JOINTS, self.robot_name)
