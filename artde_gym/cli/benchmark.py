@@ -13,10 +13,8 @@ from rich.table import Table
 from rich.text import Text
 
 from artde_gym.benchmark import SECTIONS, Section, measure
-from artde_gym.benchmark.page import page, record, written
 from artde_gym.cli.arguments import names
 from artde_gym.cli.display import terminal
-from artde_gym.evaluation.store import write_atomically
 
 
 def benchmark(
@@ -30,6 +28,8 @@ def benchmark(
     ] = None,
 ) -> None:
     """Measure speed and memory of environments and controllers as ratios; takes some minutes."""
+    from artde_gym.benchmark.page import page, record  # heavy: only when the command runs
+
     console = terminal()
     with console.status("") as status:
         found = measure(
@@ -46,6 +46,8 @@ def benchmark(
 
 
 def _print(section: Section, console: Console) -> None:
+    from artde_gym.benchmark.page import written
+
     table = Table("what", title=section.title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD)
     table.add_column("value", justify="right")
     table.add_column("unit")
@@ -62,6 +64,8 @@ def _print(section: Section, console: Console) -> None:
 
 
 def _write(file: Path, text: str, console: Console) -> None:
+    from artde_gym.evaluation.store import write_atomically
+
     file.parent.mkdir(parents=True, exist_ok=True)
     write_atomically(file, lambda stream: stream.write(text.encode()))
     console.print(f"Written to {file}", soft_wrap=True)
