@@ -15,6 +15,7 @@ from rich.text import Text
 from artde_gym.benchmark import SECTIONS, Section, measure
 from artde_gym.cli.arguments import names
 from artde_gym.cli.display import terminal
+from artde_gym.files import write_atomically
 
 
 def benchmark(
@@ -64,8 +65,6 @@ def _print(section: Section, console: Console) -> None:
 
 
 def _write(file: Path, text: str, console: Console) -> None:
-    from artde_gym.evaluation.store import write_atomically
-
     file.parent.mkdir(parents=True, exist_ok=True)
     write_atomically(file, lambda stream: stream.write(text.encode()))
     console.print(f"Written to {file}", soft_wrap=True)

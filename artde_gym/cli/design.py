@@ -15,6 +15,7 @@ from rich.table import Table
 from artde_gym.arguments import check_number
 from artde_gym.cli.arguments import json_object
 from artde_gym.errors import OptionError
+from artde_gym.files import write_atomically
 from artde_gym.kit import ROBOTS
 from artde_gym.palette import STYLES
 from artde_gym.report.chart import Axis, Chart
@@ -53,8 +54,6 @@ def design(
     if figure is not None:
         if not figure.name:
             raise OptionError("figure", str(figure), "the path of a file, such as m_bar.svg")
-        from artde_gym.evaluation.store import write_atomically  # heavy: with pandas
-
         for one in found:
             drawing = draw(one).encode()
             write_atomically(_file(figure, one, len(found) > 1), lambda file, drawing=drawing: file.write(drawing))

@@ -30,6 +30,7 @@ from artde_gym.cli.arguments import (
 )
 from artde_gym.cli.display import Display, terminal
 from artde_gym.cli.report import show_report
+from artde_gym.files import write_atomically
 from artde_gym.kit import ROBOTS
 
 _TESTS = [entry.frontier or kit.frontier for kit in ROBOTS.values() for entry in kit.environments]
@@ -68,8 +69,7 @@ def frontier(
     report: Report = False,
 ) -> None:
     """Find how much of one disturbance each controller survives. Re-run the command to resume."""
-    from artde_gym.evaluation.store import write_atomically  # heavy: only when the command runs
-    from artde_gym.report.frontier_page import survival_chart
+    from artde_gym.report.frontier_page import survival_chart  # heavy: only when the command runs
     from artde_gym.studies import frontier as run_frontier
     from artde_gym.studies.frontier.console import print_frontier
 
