@@ -13,10 +13,9 @@ from rich.table import Table
 from rich.text import Text
 
 from artde_gym.benchmark import SECTIONS, Section, measure
-from artde_gym.benchmark.page import page, record, written
 from artde_gym.cli.arguments import names
 from artde_gym.cli.display import terminal
-from artde_gym.evaluation.store import write_atomically
+from artde_gym.files import write_atomically
 
 
 def benchmark(
@@ -30,6 +29,8 @@ def benchmark(
     ] = None,
 ) -> None:
     """Measure speed and memory of environments and controllers as ratios; takes some minutes."""
+    from artde_gym.benchmark.page import page, record  # heavy: only when the command runs
+
     console = terminal()
     with console.status("") as status:
         found = measure(
@@ -46,6 +47,8 @@ def benchmark(
 
 
 def _print(section: Section, console: Console) -> None:
+    from artde_gym.benchmark.page import written
+
     table = Table("what", title=section.title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD)
     table.add_column("value", justify="right")
     table.add_column("unit")

@@ -15,7 +15,7 @@ from rich.table import Table
 from artde_gym.arguments import check_number
 from artde_gym.cli.arguments import json_object
 from artde_gym.errors import OptionError
-from artde_gym.evaluation.store import write_atomically
+from artde_gym.files import write_atomically
 from artde_gym.kit import ROBOTS
 from artde_gym.palette import STYLES
 from artde_gym.report.chart import Axis, Chart

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from artde_gym.evaluation.environments import physics_of
 from artde_gym.evaluation.provenance import versions
-from artde_gym.evaluation.tasks import Task, Update
+
+if TYPE_CHECKING:
+    from artde_gym.evaluation.tasks import Task, Update
 
 
 def terminal() -> Console:

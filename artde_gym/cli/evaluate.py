@@ -33,9 +33,7 @@ from artde_gym.cli.arguments import (
 )
 from artde_gym.cli.display import Display, terminal
 from artde_gym.cli.report import show_report
-from artde_gym.evaluation import evaluate as run_evaluation
 from artde_gym.evaluation.cells import CUSTOM
-from artde_gym.evaluation.console import print_result
 from artde_gym.evaluation.environments import main_scenarios
 
 
@@ -71,6 +69,9 @@ def evaluate(
     videos: Videos = False,
 ) -> None:
     """Compare controllers on the same seeded episodes and with the thesis."""
+    from artde_gym.evaluation import evaluate as run_evaluation  # heavy: only when the command runs
+    from artde_gym.evaluation.console import print_result
+
     vectorized = vectorized_by(vectorized, backend)
     if traced is not None:
         renamed_option("--traced", "--record-episodes")

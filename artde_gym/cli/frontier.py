@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -30,12 +30,11 @@ from artde_gym.cli.arguments import (
 )
 from artde_gym.cli.display import Display, terminal
 from artde_gym.cli.report import show_report
-from artde_gym.evaluation.store import write_atomically
+from artde_gym.files import write_atomically
 from artde_gym.kit import ROBOTS
-from artde_gym.report.frontier_page import survival_chart
-from artde_gym.studies import frontier as run_frontier
-from artde_gym.studies.frontier.console import print_frontier
-from artde_gym.studies.frontier.result import Frontier
+
+if TYPE_CHECKING:
+    from artde_gym.studies.frontier.result import Frontier
 
 _TESTS = [entry.frontier or kit.frontier for kit in ROBOTS.values() for entry in kit.environments]
 VARIED = dict.fromkeys(path for test in _TESTS if test for path in test.ranges)
@@ -71,6 +70,10 @@ def frontier(
     report: Report = False,
 ) -> None:
     """Find how much of one disturbance each controller survives. Re-run the command to resume."""
+    from artde_gym.report.frontier_page import survival_chart  # heavy: only when the command runs
+    from artde_gym.studies import frontier as run_frontier
+    from artde_gym.studies.frontier.console import print_frontier
+
     kwargs = environment_kwargs(env_kwargs, engine)
     console, folder = terminal(), folder_of(out)
     scenarios = [None] if scenario is None else names(scenario)

@@ -10,8 +10,6 @@ import typer
 from artde_gym.cli.arguments import AllowMixed, Engine, Report, Workers, processes
 from artde_gym.cli.display import Display, terminal
 from artde_gym.cli.report import show_report
-from artde_gym.studies import multiverse as run_multiverse
-from artde_gym.studies.multiverse.console import print_multiverse
 
 
 def multiverse(
@@ -28,6 +26,9 @@ def multiverse(
     report: Report = False,
 ) -> None:
     """Judge claims over plausible worlds that all controllers meet; the same command continues."""
+    from artde_gym.studies import multiverse as run_multiverse  # heavy: only when the command runs
+    from artde_gym.studies.multiverse.console import print_multiverse
+
     console = terminal()
     with Display(console) as display:
         found = run_multiverse(

@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
-import pandas as pd
 import typer
 
 from artde_gym.cli.arguments import AllowMixed, Pictures, Report, Seed, Videos, Workers, names, processes
 from artde_gym.cli.display import Display, terminal
 from artde_gym.cli.report import show_report
 from artde_gym.errors import OptionError
-from artde_gym.evaluation.console import print_claims, print_result
+from artde_gym.kit import ROBOTS
 from artde_gym.sim.factory import ENGINES, resolve_engine
-from artde_gym.studies import reproduce as run_reproduction
-from artde_gym.studies.frontier.console import print_frontier
-from artde_gym.studies.reproduce.claims import confirm
-from artde_gym.studies.reproduce.reproduction import scenarios_of, titles
+
+ROBOT_TITLES = [kit.title for kit in ROBOTS.values() if kit.reproduced[0]]
 
 
 def reproduce(
-    robot: Annotated[str, typer.Option(help=f"{', '.join(titles())}, or all.")] = "all",
+    robot: Annotated[str, typer.Option(help=f"{', '.join(ROBOT_TITLES)}, or all.")] = "all",
     engine: Annotated[
         str | None, typer.Option(help=f"Physics engine: {', '.join(ENGINES)}, or both. Default: the fastest.")
     ] = None,
@@ -48,6 +45,12 @@ def reproduce(
     videos: Videos = False,
 ) -> None:
     """Run the thesis' scenarios, compare its tables with the results, and judge each of its claims."""
+    from artde_gym.evaluation.console import print_claims, print_result  # heavy: only when the command runs
+    from artde_gym.studies import reproduce as run_reproduction
+    from artde_gym.studies.frontier.console import print_frontier
+    from artde_gym.studies.reproduce.claims import confirm
+    from artde_gym.studies.reproduce.reproduction import scenarios_of, titles
+
     robots = titles() if robot == "all" else [robot]
     engines = list(ENGINES) if engine == "both" else [None if engine is None else resolve_engine(engine)]
     named = None if scenario is None else names(scenario)
@@ -57,7 +60,7 @@ def reproduce(
             raise OptionError("scenario", one, f"a scenario of the robot {robot!r}")
     console = terminal()
     for name, chosen in shares.items():
-        verdicts: dict[str, pd.DataFrame] = {}
+        verdicts: dict[str, Any] = {}
         for one in engines:
             with Display(console) as display:
                 found = run_reproduction(

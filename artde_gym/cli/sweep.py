@@ -9,8 +9,6 @@ import typer
 
 from artde_gym.cli.arguments import AllowMixed, Workers, processes
 from artde_gym.cli.display import Display, terminal
-from artde_gym.studies import sweep as run_sweep
-from artde_gym.studies.sweep.console import print_sweep
 
 
 def sweep(
@@ -27,6 +25,9 @@ def sweep(
     allow_mixed: AllowMixed = False,
 ) -> None:
     """Run a grid or a random sample of cases. Re-run the command to resume."""
+    from artde_gym.studies import sweep as run_sweep  # heavy: only when the command runs
+    from artde_gym.studies.sweep.console import print_sweep
+
     console = terminal()
     with Display(console) as display:
         found = run_sweep(

@@ -26,8 +26,6 @@ from artde_gym.cli.arguments import (
     vectorized_by,
 )
 from artde_gym.cli.display import Display, terminal
-from artde_gym.studies import tune as run_tuning
-from artde_gym.studies.tune.console import print_tuning
 
 
 def tune(
@@ -51,6 +49,9 @@ def tune(
     allow_mixed: AllowMixed = False,
 ) -> None:
     """Tune gains with the same budget for every controller. Re-run the command to resume."""
+    from artde_gym.studies import tune as run_tuning  # heavy: only when the command runs
+    from artde_gym.studies.tune.console import print_tuning
+
     kwargs = environment_kwargs(env_kwargs, engine)
     console = terminal()
     with Display(console) as display:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import pandas as pd
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SEED = np.uint64
 """Dtype of a column of seeds: the same for all values, so that joining tables does not round them."""

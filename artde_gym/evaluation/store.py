@@ -15,10 +15,9 @@ import csv
 import io
 import json
 import os
-import tempfile
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -30,6 +29,7 @@ from artde_gym.errors import OptionError, StoreError
 from artde_gym.evaluation.lock import NEW_OR_EMPTY, is_empty
 from artde_gym.evaluation.provenance import MIXED, continued
 from artde_gym.evaluation.seeds import episode_seed, with_exact_seeds
+from artde_gym.files import write_atomically
 
 RECORD, TABLE = "summary.json", "episodes.csv"
 KEY = ("scenario", "controller", "episode")
@@ -263,42 +263,6 @@ def claim(folder: Path, record: str, configuration: Mapping[str, Any]) -> Mappin
         raise StoreError("output folder", str(folder), NEW_OR_EMPTY, "contains other files")
     folder.mkdir(parents=True, exist_ok=True)
     return None
-
-
-def check_replaceable(path: Path) -> None:
-    """See that a file may take the place of what is there: a device such as /dev/null would be lost to everybody.
-
-    Raises:
-        StoreError: if it is anything but a file.
-    """
-    if path.exists() and not path.is_file():
-        raise StoreError("output file", str(path), "choose another name", "is not a file that could be replaced")
-
-
-def write_atomically(path: Path, write: Callable[[BinaryIO], Any], by_way_of: Path | None = None) -> None:
-    """Write a file completely or not at all; until it is complete, it has a temporary name in `by_way_of`.
-
-    Args:
-        path: of the file.
-        write: writes its content.
-        by_way_of: a folder of the same file system; None for the file's own.
-
-    Raises:
-        StoreError: if it would take the place of a folder or a device.
-    """
-    check_replaceable(path)
-    handle, temporary = tempfile.mkstemp(dir=by_way_of or path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            write(file)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            os.unlink(temporary)
-        raise
 
 
 def _line(values: list[Any]) -> str:

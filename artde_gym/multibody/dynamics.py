@@ -123,20 +123,25 @@ class RigidBodyTree:
         acceleration is that of the base origin (not the spatial one).
         """
         frames = self.frames(q, rot_base_to_world)
-        omega, alpha, accel = self._accelerations(frames, qd, qdd, base_velocity, base_acceleration)
-        arm = frames.com - frames.origin
-        accel_com = accel + _cross(alpha, arm) + _cross(omega, _cross(omega, arm))
-        accel_com[..., 2] += GRAVITY
-        force = self._mass[:, None] * accel_com
-        inertia = frames.rot @ self._inertia @ np.swapaxes(frames.rot, -1, -2)
-        moment = (inertia @ alpha[..., None])[..., 0] + _cross(omega, (inertia @ omega[..., None])[..., 0])
-        moment += _cross(frames.com, force)  # about the base origin
+        force, moment = self._wrenches(frames, qd, qdd, base_velocity, base_acceleration)
         # the load of each joint: the sum over the links that it moves
         force_carried = np.einsum("bj,...bi->...ji", self._supports, force)
         moment_carried = np.einsum("bj,...bi->...ji", self._supports, moment)
         moment_carried -= _cross(frames.origin[..., 1:, :], force_carried)
         torque = np.einsum("...ji,...ji->...j", frames.axis, moment_carried) @ self._transmission
         return np.concatenate([force.sum(axis=-2), moment.sum(axis=-2), torque + self._armature * qdd], axis=-1)
+
+    def base_wrench(
+        self,
+        q: Array,
+        qd: Array,
+        qdd: Array,
+        base_velocity: Array | None = None,
+        base_acceleration: Array | None = None,
+    ) -> Array:
+        """Return the force and moment on an upright base, (..., 6): the first components of `inverse_dynamics`."""
+        force, moment = self._wrenches(self.frames(q), qd, qdd, base_velocity, base_acceleration)
+        return np.concatenate([force.sum(axis=-2), moment.sum(axis=-2)], axis=-1)
 
     def jacobian(self, link: str, q: Array, rot_base_to_world: Array | None = None) -> Array:
         """Return J (..., 6, 6 + n) of the velocity [linear; angular] of the origin of `link`."""
@@ -186,6 +191,20 @@ class RigidBodyTree:
         linear[..., 6:] = np.swapaxes(moved, -1, -2)
         angular[..., 6:] = np.swapaxes(frames.axis[..., None, :, :] * supports[..., None], -1, -2)
         return linear, angular
+
+    def _wrenches(
+        self, frames: Frames, qd: Array, qdd: Array, base_velocity: Array | None, base_acceleration: Array | None
+    ) -> tuple[Array, Array]:
+        """Return the force and the moment about the base origin that move each link, (..., b, 3)."""
+        omega, alpha, accel = self._accelerations(frames, qd, qdd, base_velocity, base_acceleration)
+        arm = frames.com - frames.origin
+        accel_com = accel + _cross(alpha, arm) + _cross(omega, _cross(omega, arm))
+        accel_com[..., 2] += GRAVITY
+        force = self._mass[:, None] * accel_com
+        inertia = frames.rot @ self._inertia @ np.swapaxes(frames.rot, -1, -2)
+        moment = (inertia @ alpha[..., None])[..., 0] + _cross(omega, (inertia @ omega[..., None])[..., 0])
+        moment += _cross(frames.com, force)  # about the base origin
+        return force, moment
 
     def _accelerations(
         self, frames: Frames, qd: Array, qdd: Array, base_velocity: Array | None, base_acceleration: Array | None

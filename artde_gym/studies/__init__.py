@@ -5,11 +5,16 @@ every controller the same number of trials, `sweep` runs a grid or a random samp
 claims over plausible worlds.
 """
 
-from artde_gym.studies.frontier import Frontier, frontier
-from artde_gym.studies.multiverse import Multiverse, multiverse, read_multiverse, register_world_claims
-from artde_gym.studies.reproduce import Reproduction, reproduce
-from artde_gym.studies.sweep import Sweep, read_sweep, sweep
-from artde_gym.studies.tune import Tuning, tune
+from typing import TYPE_CHECKING
+
+from artde_gym.lazy import lazy
+
+if TYPE_CHECKING:
+    from artde_gym.studies.frontier import Frontier, frontier
+    from artde_gym.studies.multiverse import Multiverse, multiverse, read_multiverse, register_world_claims
+    from artde_gym.studies.reproduce import Reproduction, reproduce
+    from artde_gym.studies.sweep import Sweep, read_sweep, sweep
+    from artde_gym.studies.tune import Tuning, tune
 
 __all__ = [
     "Frontier",
@@ -26,3 +31,22 @@ __all__ = [
     "sweep",
     "tune",
 ]
+
+__getattr__ = lazy(
+    __name__,
+    {
+        "Frontier": "artde_gym.studies.frontier",
+        "Multiverse": "artde_gym.studies.multiverse",
+        "Reproduction": "artde_gym.studies.reproduce",
+        "Sweep": "artde_gym.studies.sweep",
+        "Tuning": "artde_gym.studies.tune",
+        "frontier": "artde_gym.studies.frontier",
+        "multiverse": "artde_gym.studies.multiverse",
+        "read_multiverse": "artde_gym.studies.multiverse",
+        "read_sweep": "artde_gym.studies.sweep",
+        "register_world_claims": "artde_gym.studies.multiverse",
+        "reproduce": "artde_gym.studies.reproduce",
+        "sweep": "artde_gym.studies.sweep",
+        "tune": "artde_gym.studies.tune",
+    },
+)

@@ -14,7 +14,7 @@ from PIL import Image
 
 from artde_gym.arguments import check_number
 from artde_gym.errors import OptionError
-from artde_gym.evaluation.store import check_replaceable
+from artde_gym.files import check_replaceable
 
 Picture = NDArray[np.uint8]
 

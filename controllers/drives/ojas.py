@@ -9,7 +9,6 @@ import numpy as np
 from artde_gym.doctor.check_result import CheckResult
 from artde_gym.multibody.dynamics import RigidBodyTree, joint_space_inertia
 from artde_gym.robots.ojas.model import ActuatorInertia, ojas
-from artde_gym.robots.ojas.walking import walking_pattern
 from controllers.design import preset_designs
 from controllers.drive import Drive
 from controllers.loop import Loop
@@ -27,6 +26,8 @@ def loops(*, actuator_inertia: ActuatorInertia = "rotor", speed: float = 0.1, st
     Raises:
         OptionError: for an argument out of range.
     """
+    from artde_gym.robots.ojas.walking import walking_pattern  # SciPy's splines: only when the loops are asked for
+
     pattern = walking_pattern(speed, step_duration, _WALKED, _SAMPLED)
     spec = ojas(actuator_inertia)
     inertia = joint_space_inertia(RigidBodyTree(spec).mass_matrix(pattern.q))

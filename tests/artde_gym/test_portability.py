@@ -49,7 +49,8 @@ sys.modules.update(dict.fromkeys(["pybullet", "pybullet_data"]))
 
 HIDE_POSIX = """
 import builtins, os, signal, socket, multiprocessing
-import filelock, gymnasium, mujoco, numpy, pandas, scipy.stats, typer, rich.console, PIL.Image
+import filelock, gymnasium, mujoco, numpy, pandas, platformdirs
+import scipy.stats, typer, rich.console, PIL.Image
 for name in ("sched_getaffinity", "getloadavg", "fork", "geteuid", "getuid", "killpg"):
     delattr(os, name)
 for name in ("SIGKILL", "SIGALRM", "SIGHUP", "setitimer", "alarm", "pause"):

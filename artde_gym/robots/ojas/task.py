@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import weakref
 from collections.abc import Callable, Mapping
 from typing import Any, Literal, TypeVar, get_args
 
@@ -153,7 +154,8 @@ class Walk:
         robot: simulated model.
         pattern: walking pattern.
         substeps: physics steps per control period.
-        plan: references in the observation, one row per control period: (samples, 38).
+        plan: references in the observation, one row per control period: (samples, 38); read-only, and shared by all
+            environments of a process that walk alike.
         position: position of the base at the start (m), with the robot upright.
         stand: joint torques (12,) (Nm) that balance the pattern's first pose.
         damping: damping of the joints while the robot settles (Nm s/rad).
@@ -193,8 +195,7 @@ class Walk:
         model = dataclasses.replace(ojas(actuator_inertia, arms=arms), feet_collide=collide)
         substeps = steps_per_period(control_period, TIME_STEP)
         pattern = walking_pattern(speed, step_duration, duration, TIME_STEP)
-        columns = (pattern.q, pattern.qd, pattern.qdd, pattern.load_left[:, None], pattern.phase[:, None])
-        plan = np.concatenate([column[::substeps] for column in columns], axis=1)
+        plan = _shared_plan(pattern, (float(speed), float(step_duration), float(duration), substeps))
         hip_height = robot.ANKLE_HEIGHT + hip_height_above_ankle(speed)
         rest = np.zeros(N_JOINTS)
         stand = Supported(nominal).torque(0.5, pattern.q[0], rest, rest)
@@ -273,6 +274,21 @@ class Walk:
         which any initial error causes antagonistic torques of several Nm.
         """
         return self.stand + SETTLE_STIFFNESS * (pose - q) - self.damping * qd
+
+
+_plans: weakref.WeakValueDictionary[tuple[float, ...], Array] = weakref.WeakValueDictionary()
+"""Plans of the environments that exist, by the walk's arguments and the substeps."""
+
+
+def _shared_plan(pattern: WalkingPattern, key: tuple[float, ...]) -> Array:
+    """Return the plan of a walk, `Walk.plan`."""
+    plan = _plans.get(key)
+    if plan is None:
+        columns = (pattern.q, pattern.qd, pattern.qdd, pattern.load_left[:, None], pattern.phase[:, None])
+        plan = np.concatenate([column[:: int(key[-1])] for column in columns], axis=1)
+        plan.setflags(write=False)
+        _plans[key] = plan
+    return plan
 
 
 def torque_limit(sampled: Mapping[str, Any]) -> float:

@@ -27,8 +27,11 @@ from scipy.linalg import solve_banded
 
 from artde_gym.arguments import check_number
 from artde_gym.arrays import Array
+from artde_gym.cache import cached
 from artde_gym.errors import OptionError
+from artde_gym.multibody import dynamics, spec
 from artde_gym.multibody.dynamics import GRAVITY, RigidBodyTree
+from artde_gym.robots.ojas import leg_ik
 from artde_gym.robots.ojas import model as robot
 from artde_gym.robots.ojas.leg_ik import leg_angles
 
@@ -37,7 +40,9 @@ DOUBLE_SUPPORT = 0.2  # share of a step
 STEP_HEIGHT = 0.04  # m
 GRID_PERIOD = 0.005  # s, of the pendulum problem and of the spline knots
 CORRECTION_PASSES = 5  # of the multibody correction
-MAX_DURATION = 1800.0  # s, of a walk; it needs 1.5 MB per second, and 3 % of its duration for planning
+BLOCK = 256  # samples of the multibody correction at once: their numbers fit into caches
+STORED_SAMPLES = 1000  # of the grid; shorter walks are planned faster than a file is read
+MAX_DURATION = 1800.0  # s, of a walk; it needs 0.8 MB per second, and 2 % of its duration for planning
 
 _HIPS = np.array([[0.0, robot.HIP_OFFSET, 0.0], [0.0, -robot.HIP_OFFSET, 0.0]])
 
@@ -102,7 +107,7 @@ def walking_pattern(
 def _pattern(speed: float, step_duration: float, duration: float, period: float) -> WalkingPattern:
     gait = _Gait(speed, step_duration, duration)
     time = GRID_PERIOD * np.arange(math.ceil(duration / GRID_PERIOD - 1e-9) + 1)
-    hips = _solve(gait, time)
+    hips = _base_positions(gait, time)
     fine = period * np.arange(math.floor(duration / period + 1e-9) + 1)
     spline = _spline(time, _joint_angles(hips, gait.feet(time)))
     pattern = WalkingPattern(
@@ -183,6 +188,20 @@ class _Gait:
         return step, np.clip(exact - step, 0.0, 1.0)
 
 
+def _base_positions(gait: _Gait, time: Array) -> Array:
+    """Return the result of `_solve`, which is stored in the user's cache if it takes long."""
+    if len(time) < STORED_SAMPLES:
+        return _solve(gait, time)
+    constants = STAND, DOUBLE_SUPPORT, STEP_HEIGHT, GRID_PERIOD, CORRECTION_PASSES
+    key = {
+        "walk": (gait.speed, gait.period, len(time), gait.steps),
+        "constants": constants,
+        "robot": repr(robot.ojas("none")),
+    }
+    modules = (__file__, *(str(module.__file__) for module in (dynamics, leg_ik, robot, spec)))
+    return cached("walk", key, modules, lambda: _solve(gait, time))
+
+
 def _solve(gait: _Gait, time: Array) -> Array:
     """Return positions of the base (samples, 3) for which the whole robot's ZMP follows the gait's."""
     tree = RigidBodyTree(robot.ojas("none"))
@@ -211,10 +230,13 @@ def _pendulum(zmp: Array, height: float) -> Array:
 def _multibody_zmp(tree: RigidBodyTree, time: Array, hips: Array, feet: Array) -> Array:
     """Return the point where the ground reaction has no horizontal moment, (samples, 2) (m)."""
     joints, base = _spline(time, _joint_angles(hips, feet)), _spline(time, hips)
-    zero = np.zeros_like(hips)
-    motion = (np.concatenate([base.derivative(order)(time), zero], axis=-1) for order in (1, 2))
-    q, qd, qdd = joints(time), joints.derivative(1)(time), joints.derivative(2)(time)
-    wrench = tree.inverse_dynamics(q, qd, qdd, *motion)[:, :6]
+    curves = [curve.derivative(order) for curve, order in ((joints, 0), (joints, 1), (joints, 2), (base, 1), (base, 2))]
+    wrench = np.empty((len(time), 6))
+    for first in range(0, len(time), BLOCK):
+        block = slice(first, first + BLOCK)
+        q, qd, qdd, *motion = (curve(time[block]) for curve in curves)
+        twists = (np.concatenate([linear, np.zeros_like(linear)], axis=-1) for linear in motion)
+        wrench[block] = tree.base_wrench(q, qd, qdd, *twists)
     force, moment = wrench[:, :3], wrench[:, 3:]  # about the base origin
     x = hips[:, 0] - (moment[:, 1] + hips[:, 2] * force[:, 0]) / force[:, 2]
     y = hips[:, 1] + (moment[:, 0] - hips[:, 2] * force[:, 1]) / force[:, 2]
