@@ -42,6 +42,8 @@ _STIFF = (
     "valid where all inertias are 15 % smaller than modeled; at 1 ms, stiffness 770 Nm/rad in place of 420"
 )
 
+SUPPORT_ACTUATORS = "rotor"
+"""Actuator model from which the support preset follows."""
 SUPPORT_M_BAR = 0.08
 """On both feet and on none, 0.88 of the limit of 0.0909 without contact."""
 _SWITCHED: dict[str, Any] = {
