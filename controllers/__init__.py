@@ -18,9 +18,9 @@ def make(name: str, env: Any, **overrides: Any) -> Any:
     """Make the controller called `name` for an environment, or for a vector of equal ones.
 
     Args:
-        name: "tde", "atde", "artde", "artde-robust", "pid", "tde+c", "tde+kd", for the biped "computed-torque" and
-            "tde-stiff", for the quadrotor "asmc", "geometric", "indi", or whatever was given to
-            `artde_gym.register_controller`.
+        name: "tde", "atde", "artde", "artde-robust", "pid", "tde+c", "tde+kd"; for the biped "computed-torque",
+            "tde-stiff", "artde-stiff", "tde-switched", "atde-switched" and "artde-switched"; for the quadrotor "asmc",
+            "geometric", "indi"; or whatever was given to `artde_gym.register_controller`.
         env: the environment that it will drive; its robot decides which policy the name stands for.
         overrides: gains in place of the preset's, and `preset="thesis"`, `"robust"`, ...; for laws on all joints also
             `velocity_cutoff_hz` and `time_base`, see `controllers.joint_space.make_joint_space`; of the quadrotor's two

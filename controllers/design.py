@@ -7,14 +7,13 @@ motion. At the sampling period L the law then holds a joint with the stiffness K
 from __future__ import annotations
 
 import dataclasses
-import inspect
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from artde_gym.errors import OptionError, UnknownNameError, suggest_names
+from artde_gym.errors import UnknownNameError, suggest_names
 from controllers.drive import DRIVES, Drive
 from controllers.law_table import LAWS
 from controllers.laws.errors import GainError
@@ -22,6 +21,7 @@ from controllers.laws.stability import largest_joint_m_bar, largest_m_bar, tde_e
 from controllers.laws.tde import TdeGains
 from controllers.laws.tracking import check_positive_number
 from controllers.loop import Loop
+from controllers.motion import check_motion
 from controllers.presets import LOOPS, preset_gains
 
 Array = NDArray[np.floating[Any]]
@@ -123,12 +123,7 @@ def loops(robot: str, **motion: Any) -> list[Loop]:
     able = designed()
     if robot not in able:
         raise UnknownNameError("robot", robot, suggest_names(robot, able))
-    known = inspect.signature(able[robot]).parameters
-    for name in motion:
-        if name not in known:
-            raise OptionError(
-                f"argument of {robot!r}", name, suggest_names(name, known) if known else "none: it takes none"
-            )
+    check_motion(robot, able[robot], motion)
     return able[robot](**motion)
 
 

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 from artde_gym.doctor.check_result import CheckResult
 from artde_gym.registry import Registry
-from controllers.loop import Loop
+from controllers.loop import Loop, SupportPhase
 from controllers.policies import Policy
 
 
@@ -37,6 +37,8 @@ class Drive:
         period: sampling period of its environments where nothing else is asked for (s).
         loops: for `artde-gym design`: lists its parts, each with its inertia along the reference, which the keyword
             arguments describe; None if the robot has no such model.
+        supports: for `artde-gym design` of laws that switch: lists the phases of support of a stride, which the keyword
+            arguments describe; None for a robot that does not walk.
         stability: for `artde-gym doctor`: tells whether time-delay estimation converges at the presets; None to judge
             all presets of all loops.
     """
@@ -47,6 +49,7 @@ class Drive:
     make: Callable[..., Policy] | None = None
     period: float = 0.001
     loops: Callable[..., list[Loop]] | None = None
+    supports: Callable[..., list[SupportPhase]] | None = None
     stability: Callable[[], Sequence[CheckResult]] | None = None
 
 

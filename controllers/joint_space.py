@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from artde_gym.errors import OptionError
 from controllers.encoders import EncoderPolicy
 from controllers.law_table import LAWS
 from controllers.laws.tracking import Array, JointInput, LawState, check_positive_number
@@ -12,14 +13,21 @@ from controllers.presets import preset_gains
 
 
 class LawPolicy(TrackingPolicy):
-    """One of the laws that need nothing but the signals and the sampling period.
+    """A law of the table on its signals, the sampling period, and the fields of the observation that it names.
 
     `time_base` is the period L that the law divides by, over the true one.
+
+    Raises:
+        OptionError: for an environment whose observation has no such field.
     """
 
     def __init__(self, name: str, interface: ControlInterface, gains: Any, time_base: float = 1.0) -> None:
         check_positive_number("time_base", time_base)
         entry = LAWS[name]
+        if missing := set(entry.reads) - set(interface.observation.slices):
+            raise OptionError(f"observation of the environment of {name!r}", list(interface.observation.slices),
+                              f"with {', '.join(sorted(missing))}, as that of BipedWalk-Payload-v0")  # fmt: skip
+        self._further = [interface.observation[field] for field in entry.reads]
         self._law, self._period = entry.law, time_base * interface.control_period
         super().__init__(name, interface, entry.convert(gains, self._period))
 
@@ -30,7 +38,8 @@ class LawPolicy(TrackingPolicy):
         return self._law.start(self.gains, signals, self._period)
 
     def step(self, state: Any, signals: JointInput, observation: Array) -> tuple[Array, LawState]:
-        return self._law.step(self.gains, state, signals, self._period)
+        further = (observation[..., part] for part in self._further)
+        return self._law.step(self.gains, state, signals, self._period, *further)
 
 
 def make_joint_space(
@@ -58,6 +67,7 @@ def make_joint_space(
     Raises:
         UnknownNameError: for a law that the robot does not have, or an unknown preset.
         GainError: for an unknown gain or a value that is not allowed.
+        OptionError: for a law that reads what the environment does not observe.
     """
     interface = ControlInterface.of(env)
     policy = LawPolicy(

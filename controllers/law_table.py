@@ -12,6 +12,17 @@ from controllers.laws.indi import IndiGains, indi, indi_init
 from controllers.laws.pid import PidGains, identity_gains, pid, pid_init
 from controllers.laws.positional_pid import PositionalPidGains, positional_pid, positional_pid_init
 from controllers.laws.rigid_attitude import RigidAttitudeGains, rigid_attitude
+from controllers.laws.switched import (
+    SwitchedArtdeGains,
+    SwitchedAtdeGains,
+    SwitchedTdeGains,
+    switched_artde,
+    switched_artde_init,
+    switched_atde,
+    switched_atde_init,
+    switched_tde,
+    switched_tde_init,
+)
 from controllers.laws.tde import ConstantGains, TdeGains, constant_gain_tde, equivalent_gains, tde, tde_init
 from controllers.laws.tracking import Array, JointInput, Law, LawState
 
@@ -22,12 +33,14 @@ class Entry(NamedTuple):
     Attributes:
         gains: dataclass of its presets' gains, if it drives joints; it is then a controller under its name.
         text: description of that controller.
+        reads: fields of the observation that it takes after the sampling period.
     """
 
     law: Law
     convert: Callable[[Any, float], Any]
     gains: type[Any] | None = None
     text: str = ""
+    reads: tuple[str, ...] = ()
 
 
 class Nothing(NamedTuple):
@@ -64,6 +77,10 @@ def _rigid_attitude(
     return rigid_attitude(gains, signals), state
 
 
+def _switched(law: Law, gains: type[Any], name: str) -> Entry:
+    return Entry(law, _same, gains, f"biped: {name} with gains for each phase of support", ("contact",))
+
+
 def _same(gains: Any, _period: float) -> Any:
     return gains
 
@@ -87,6 +104,9 @@ LAWS: dict[str, Entry] = {
     ),
     "asmc": Entry(Law(_asmc_init, asmc), _same, AsmcGains, "quadrotor: adaptive sliding mode (this project's own law)"),
     "indi": Entry(Law(_indi_init, indi), _same, IndiGains, "quadrotor: incremental nonlinear dynamic inversion"),
+    "tde-switched": _switched(Law(switched_tde_init, switched_tde), SwitchedTdeGains, "TDE"),
+    "atde-switched": _switched(Law(switched_atde_init, switched_atde), SwitchedAtdeGains, "ATDE"),
+    "artde-switched": _switched(Law(switched_artde_init, switched_artde), SwitchedArtdeGains, "ARTDE"),
     "positional-pid": Entry(Law(_positional_pid_init, positional_pid), _same),
     "rigid-attitude": Entry(Law(_rigid_attitude_init, _rigid_attitude), _same),
 }

@@ -1,4 +1,4 @@
-"""A part of a robot that one law drives, with the inertia that the law meets."""
+"""A part of a robot that one law drives, with the inertia that the law meets, in one phase of support or in all."""
 
 from __future__ import annotations
 
@@ -24,3 +24,21 @@ class Loop(NamedTuple):
     unit: str
     time: NDArray[np.floating[Any]]
     inertia: NDArray[np.floating[Any]]
+
+
+class SupportPhase(NamedTuple):
+    """A phase of support of a walking robot along its reference.
+
+    Attributes:
+        name: "left", "both" or "right".
+        joints: names of its coordinates.
+        time: of the reference (k,) (s).
+        inverse_inertia: acceleration of the joints by a force on them while the feet stand (k, n, n) (1/(kg m^2)).
+        share: of the time.
+    """
+
+    name: str
+    joints: tuple[str, ...]
+    time: NDArray[np.floating[Any]]
+    inverse_inertia: NDArray[np.floating[Any]]
+    share: float

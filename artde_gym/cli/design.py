@@ -21,6 +21,7 @@ from artde_gym.palette import STYLES
 from artde_gym.report.chart import Axis, Chart
 from controllers.design import DELAYED, Design, designed
 from controllers.design import design as work_out
+from controllers.support_design import SWITCHED, SupportDesign, derived_gains, design_supports
 
 NAMES = {ROBOTS[robot].title: robot for robot in designed() if robot in ROBOTS}
 """Robots by title."""
@@ -28,7 +29,7 @@ NAMES = {ROBOTS[robot].title: robot for robot in designed() if robot in ROBOTS}
 
 def design(
     robot: Annotated[str, typer.Option(help=f"{' or '.join(NAMES)}.")] = "biped",
-    law: Annotated[str, typer.Option(help=f"{', '.join(DELAYED)}.")] = "tde",
+    law: Annotated[str, typer.Option(help=f"{', '.join((*DELAYED, *SWITCHED))}.")] = "tde",
     preset: Annotated[str | None, typer.Option(help="Preset of the law's gains; see `list controllers`.")] = None,
     gains: Annotated[str | None, typer.Option(help='JSON; override gains of the preset, e.g. {"m_bar": 0.08}.')] = None,
     period: Annotated[float | None, typer.Option(help="Control period L (s). Default: the robot's.")] = None,
@@ -38,18 +39,31 @@ def design(
     speed: Annotated[float | None, typer.Option(help="Biped only: walking speed (m/s). Default: 0.1.")] = None,
     step_duration: Annotated[float | None, typer.Option(help="Biped only: duration of a step (s). Default: 1.")] = None,
     motion: Annotated[str | None, typer.Option(help="JSON; arguments of another robot's motion.")] = None,
+    cap: Annotated[
+        float, typer.Option(help="Laws that switch: largest eigenvalue of what is derived (kg m^2).")
+    ] = 0.09,
     figure: Annotated[
         Path | None, typer.Option(help="SVG file for the limit along the reference, one per loop.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Print the valid range of m_bar, the joint stiffness K_d m_bar / L, and the margin to the limit."""
+    """Print the valid range of m_bar, the joint stiffness K_d m_bar / L, and the margin to the limit.
+
+    Of a law that switches with the support phase, print the range of each phase; --json holds, as "gains", the nominal
+    inertias that follow from the robot's spec and gait.
+    """
     if robot not in NAMES:
         raise OptionError("robot", robot, ", ".join(map(repr, NAMES)))
     if period is not None:
         check_number("period", period, 1e-6, 10.0, "1e-6 to 10 s")
     walk = {"actuator_inertia": actuator_inertia, "speed": speed, "step_duration": step_duration}
     given = {name: value for name, value in walk.items() if value is not None} | json_object("--motion", motion)
+    if law in SWITCHED:
+        if figure is not None:
+            raise OptionError("figure", str(figure), f"a law with one m_bar: {', '.join(DELAYED)}")
+        chosen = json_object("gains", gains)
+        _show_supports(robot, law, design_supports(NAMES[robot], law, preset, cap, gains=chosen, **given), as_json)
+        return
     found = work_out(NAMES[robot], law, preset, period, gains=json_object("gains", gains), **given)
     if figure is not None:
         if not figure.name:
@@ -101,3 +115,26 @@ def _print(one: Design, console: Console) -> None:
     edge = f"{100 * one.used:.0f} % of the limit 2, margin of a factor {one.room:.3g}"
     verdict = edge if one.valid else "OUTSIDE (0, 2): time-delay estimation diverges"
     console.print(f"Eigenvalues of M^-1 m_bar: {low:.3g} to {high:.3g}, {verdict}.")
+
+
+def _show_supports(robot: str, law: str, found: list[SupportDesign], as_json: bool) -> None:
+    if as_json:
+        phases = [one.to_dict() for one in found]
+        print(json.dumps({"robot": robot, "law": law, "phases": phases, "gains": derived_gains(found)}, indent=2))
+        return
+    table = Table("support", box=box.SIMPLE_HEAD)
+    for title in ("time", "blocked", "m_bar below", "eigenvalues of A m_bar", "in any phase", "of the derived m_bar"):
+        table.add_column(title, justify="right")
+    for one in found:
+        low, high = one.felt
+        derived = "" if one.derived is None else _range(one.derived)
+        table.add_row(one.phase.name, f"{100 * one.phase.share:.1f} %", f"{one.blocked} of {len(one.phase.joints)}",
+                      f"{one.limit:.4g}", f"{low:.3g} to {high:.3g}", f"{one.largest:.3g}", derived)  # fmt: skip
+    Console().print(table)
+    verdict = "valid in every phase" if all(one.valid for one in found) else "OUTSIDE: time-delay estimation diverges"
+    print(f"Chosen nominal inertias, eigenvalues below 2: {verdict}. --json prints what is derived.")
+
+
+def _range(matrix: np.ndarray) -> str:
+    values = np.linalg.eigvalsh(matrix)
+    return f"{values[0]:.3g} to {values[-1]:.3g}"

@@ -176,6 +176,8 @@ def _line(console: Console, text: str) -> None:
 
 def _value(value: Any) -> str:
     if isinstance(value, list):
+        if value and isinstance(value[0], list):
+            return f"{len(value)} x {len(value)} (--json)"
         return ", ".join(map(_value, value))
     return str(value) if isinstance(value, (str, bool)) else f"{value:.4g}"
 

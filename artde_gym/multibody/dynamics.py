@@ -235,6 +235,18 @@ def joint_space_inertia(mass_matrix: Array) -> Array:
     return mass_matrix[..., 6:, 6:] - np.swapaxes(cross, -1, -2) @ np.linalg.solve(base, cross)
 
 
+def constrained_inverse_inertia(mass_matrix: Array, jacobian: Array) -> Array:
+    """Return A (..., n, n) in qdd = A tau + ... of a robot whose `jacobian` (..., m, 6 + n) times v stays constant.
+
+    The joint block of M^-1 - M^-1 J^T (J M^-1 J^T)^-1 J M^-1; of the links that stand, `RigidBodyTree.jacobian`.
+    Constraints that repeat each other count once.
+    """
+    inverse = np.linalg.inv(mass_matrix)
+    coupled = inverse @ np.swapaxes(jacobian, -1, -2)
+    shared = np.linalg.pinv(jacobian @ coupled, rcond=1e-9, hermitian=True)
+    return (inverse - coupled @ shared @ np.swapaxes(coupled, -1, -2))[..., 6:, 6:]
+
+
 def _rotations(axis: Array, angle: Array) -> Array:
     """Return Rodrigues' R = 1 + sin(a) [axis]x + (1 - cos(a)) [axis]x^2, (..., j, 3, 3)."""
     cross = _skew(axis)

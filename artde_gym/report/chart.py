@@ -171,6 +171,15 @@ class Chart:
             f'<text {place} y="{TOP + 10}">{escape(text)}</text></g>'
         )
 
+    def strip(self, spans: Sequence[tuple[float, float]], look: Style, text: str) -> None:
+        """Mark parts of the x axis with a color, just below it."""
+        floor, (low, high) = self.height - BOTTOM + 3, (self.x.low, self.x.high)
+        shown = [(max(begin, low), min(end, high)) for begin, end in spans if begin < high and end > low]
+        if shown:
+            ends, _ = self._points(shown, np.full((len(shown), 2), self.y.low))
+            drawn = "".join(f"M{first:.1f} {floor}H{last:.1f}" for first, last in ends)
+            self._parts.append(f'<path class="strip" style="--c:{look.color}" d="{drawn}">{_title(text)}</path>')
+
     def level(self, y: float, text: str, look: Style | None = None) -> None:
         """Draw a horizontal line, labeled at its right end."""
         (_,), (up,) = self._points([self.x.low], [y])

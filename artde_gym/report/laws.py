@@ -74,7 +74,7 @@ class Laws:
         """Return charts of the eigenvalues of M^-1 m_bar, which must lie in (0, 2)."""
         nominal = {}
         for name, own in self.gains(scenario).items():
-            for gain in ("m_bar", "m_bar_p", "m_bar_q"):
+            for gain in ("m_bar", "m_bar_left", "m_bar_right", "m_bar_p", "m_bar_q"):
                 if gain in own:
                     nominal.setdefault(json.dumps([gain, np.asarray(own[gain]).tolist()]), []).append(name)
         if not nominal:
@@ -94,10 +94,11 @@ class Laws:
         inertia = inertia_at(q)
         charts = {}
         for key, names in nominal.items():
-            _, m_bar = json.loads(key)
-            weight = np.diag(np.broadcast_to(np.asarray(m_bar, dtype=np.float64), q.shape[1]))
+            gain, m_bar = json.loads(key)
+            given = np.asarray(m_bar, dtype=np.float64)
+            weight = given if given.ndim == 2 else np.diag(np.broadcast_to(given, q.shape[1]))
             values = np.array([eigh(weight, one, eigvals_only=True) for one in inertia])
-            title = f"m_bar = {_text(m_bar)}: {', '.join(names)}"
+            title = f"{gain} = {_text(m_bar)}: {', '.join(names)}"
             chart = Chart(f"Eigenvalues of M^-1 m_bar for {title}", Axis("time (s)", 0, float(time[-1])),
                           Axis.of("eigenvalue (1)", values, [2.0], zero=True))  # fmt: skip
             for column in values.T:
@@ -166,4 +167,7 @@ def _shown(value: Any) -> str | Cell:
 
 
 def _text(value: Any) -> str:
+    if np.ndim(value) == 2:
+        values = np.linalg.eigvalsh(np.asarray(value))
+        return f"{len(values)} x {len(values)}, eigenvalues {values[0]:.4g} to {values[-1]:.4g}"
     return ", ".join(f"{number:.4g}" for number in np.ravel(value))

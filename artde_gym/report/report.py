@@ -20,7 +20,7 @@ from artde_gym.report.html import bullets, page, paragraph, section
 from artde_gym.report.laws import Laws, unavailable
 from artde_gym.report.pictures import Progress, SnapshotSet
 from artde_gym.report.replays import replay_of
-from artde_gym.report.robot import figures_of
+from artde_gym.report.robot import figures_of, with_strip
 from artde_gym.report.run import Episode, Run
 from artde_gym.scenarios import SCENARIOS
 from artde_gym.studies.frontier.result import RECORD
@@ -119,7 +119,8 @@ def _scenario(run: Run, laws: Laws, album: SnapshotSet, scenario: str, said: lis
 
 
 def _episode(run: Run, laws: Laws, scenario: str, episode: Episode) -> list[str]:
-    tracking = run.tracking(scenario)
+    robot = robot_of(run.cell(scenario)["env_id"])
+    tracking, episode = run.tracking(scenario), with_strip(robot, episode)
     parts = [*signals.tracking_error(episode, tracking), signals.gains(episode)]
     try:
         matrix = laws.lyapunov_matrix(scenario)
@@ -128,7 +129,7 @@ def _episode(run: Run, laws: Laws, scenario: str, episode: Episode) -> list[str]
         inside = laws.section(scenario)
     except ValueError as error:  # a controller, a gain or an environment that no longer exists
         inside = [unavailable(error)]
-    figures = figures_of(robot_of(run.cell(scenario)["env_id"]))
+    figures = figures_of(robot)
     return [*parts, *([] if figures is None else figures.figures(episode)), *inside]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 from collections.abc import Mapping
 from typing import Any, Protocol, cast
@@ -20,6 +21,14 @@ class RobotFigures(Protocol):
     def figures(self, episode: Episode) -> list[str]:
         """Return figures of one episode with all its controllers."""
         ...
+
+    # a module may also have `strip(episode) -> Strip`: what all charts of an episode show below their time
+
+
+def with_strip(robot: str, episode: Episode) -> Episode:
+    """Return an episode with the strip that a robot shows below the charts, if it has one."""
+    strip = getattr(figures_of(robot), "strip", None)
+    return episode if strip is None else dataclasses.replace(episode, strip=strip(episode))
 
 
 def figures_of(robot: str) -> RobotFigures | None:

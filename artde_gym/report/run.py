@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 
@@ -20,6 +20,7 @@ from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.rollout import nested
 from artde_gym.evaluation.store import parse_table, read_episodes, read_traces
 from artde_gym.metrics_spec import MetricsSpec
+from artde_gym.palette import Style
 from artde_gym.studies.reproduce.claims import CLAIM_COLUMNS
 
 ABLATIONS = "ablation"  # folder of `reproduce`'s ablations
@@ -136,12 +137,35 @@ class Signals:
         return self.fields.get(INSIDE + name)
 
 
+class Band(NamedTuple):
+    """Parts of the time (s) in which something holds, and their style."""
+
+    text: str
+    style: Style
+    spans: Sequence[Span]
+
+
+class Strip(NamedTuple):
+    """What a robot shows below the time of every chart: bands, and what a caption says of them."""
+
+    caption: str
+    bands: Sequence[Band]
+
+
+NO_STRIP = Strip("", ())
+
+
 @dataclasses.dataclass(frozen=True)
 class Episode:
-    """Episodes of several controllers with the same seed."""
+    """Episodes of several controllers with the same seed.
+
+    Attributes:
+        strip: shown below the time of its charts.
+    """
 
     number: int
     signals: Mapping[str, Signals]
+    strip: Strip = NO_STRIP
 
     @property
     def seed(self) -> int:

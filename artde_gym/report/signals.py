@@ -10,12 +10,14 @@ from artde_gym.metrics_spec import MetricsSpec, TrackedSignal
 from artde_gym.palette import styles
 from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.html import figure
-from artde_gym.report.run import INSIDE, Episode, Signals
+from artde_gym.report.run import INSIDE, Episode, Signals, Strip
 
 INNER: dict[str, tuple[str, str]] = {
     "beta_0": ("b0", "b0 (acceleration)"),
     "beta_1": ("b1", "b1 (acceleration per |xi|)"),
     "c": ("c", "c (acceleration)"),
+    "phase": ("phase, support", "phase: 1 left, 0 both, -1 right"),
+    "blend": ("b, blend of the support phases", "b (1)"),
     "sigma": ("|sigma|, error of time-delay estimation", "|sigma| (acceleration)"),
     "s": ("|s|, sliding variable", "|s| (SI)"),
 }
@@ -45,6 +47,7 @@ def tracking_error(episode: Episode, tracking: MetricsSpec) -> list[str]:
         caption = f"Tracking error, reference minus measured, episode {episode.number} (seed {episode.seed})."
         caption += " Vertical marks: pushes and drops." if episode.events else ""
         caption += " A cross marks a fall." if any(signals.fell for signals in episode.signals.values()) else ""
+        caption += episode.strip.caption
         figures.append(figure(caption, charts, shown))
     return figures
 
@@ -70,6 +73,7 @@ def gains(episode: Episode) -> str:
     if not charts:
         return ""
     caption = f"Inside the laws, episode {episode.number}: adaptive gains, estimation error and sliding variable."
+    caption += episode.strip.caption
     return figure(caption, charts, styles(episode.signals))
 
 
@@ -100,7 +104,7 @@ def lyapunov(episode: Episode, tracking: MetricsSpec, matrix: tuple[str, Array, 
     caption = (
         f"Lyapunov function V = 1/2 xi^T P xi with P of {owner}'s Kp and Kd (Q = I) for all. The dashed levels are the "
         "largest V of the second half of a run without a fall, the uniform ultimate bound that it suggests: "
-        f"{', '.join(bounds) or 'none here'}."
+        f"{', '.join(bounds) or 'none here'}.{episode.strip.caption}"
     )
     return figure(caption, {"": chart.svg()}, shown)
 
@@ -121,7 +125,14 @@ def over_time(
     chart = Chart(f"{name} over time", Axis("time (s)", low, high), y)
     for event, (begin, end) in episode.events.items():
         chart.event(begin, end, event)
+    add_strip(chart, episode.strip)
     return chart
+
+
+def add_strip(chart: Chart, strip: Strip) -> None:
+    """Draw the bands of a strip below the chart."""
+    for band in strip.bands:
+        chart.strip(band.spans, band.style, band.text)
 
 
 def add(chart: Chart, signals: Signals, values: Array, name: str) -> None:

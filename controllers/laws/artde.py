@@ -95,9 +95,14 @@ def artde_init(gains: ArtdeGains, signals: JointInput, period: float) -> ArtdeSt
 
 
 def artde(
-    gains: ArtdeGains, state: ArtdeState, signals: JointInput, period: float, du: Array | None = None
+    gains: ArtdeGains,
+    state: ArtdeState,
+    signals: JointInput,
+    period: float,
+    du: Array | None = None,
+    m_bar: Array | None = None,
 ) -> tuple[Array, ArtdeState]:
-    """One sample of the law at the top; `du` (..., n) is added to the robust term."""
+    """One sample of the law at the top; `du` (..., n) is added to the robust term, `m_bar` as for TDE."""
     e, ed = errors(signals)
     s = sliding_variable(e, ed, gains.k_p, gains.k_d)
     s_squared = inner(s, s)
@@ -105,7 +110,8 @@ def artde(
     c = state.beta_0 + state.beta_1 * xi
     robust = (gains.alpha * c / np.sqrt(s_squared + gains.eps))[..., None] * s
     u = desired_acceleration(signals, e, ed, gains.k_p, gains.k_d) + robust
-    tau, tde_state = time_delay(gains.m_bar, state.tde, signals, u if du is None else u + du, period)
+    own = gains.m_bar if m_bar is None else m_bar
+    tau, tde_state = time_delay(own, state.tde, signals, u if du is None else u + du, period)
     return tau, ArtdeState(tde_state, s, *_adapt(gains, state, s, s_squared, xi, period), c)
 
 

@@ -74,9 +74,14 @@ def atde_init(gains: AtdeGains, signals: JointInput, period: float) -> AtdeState
 
 
 def atde(
-    gains: AtdeGains, state: AtdeState, signals: JointInput, period: float, du: Array | None = None
+    gains: AtdeGains,
+    state: AtdeState,
+    signals: JointInput,
+    period: float,
+    du: Array | None = None,
+    m_bar: Array | None = None,
 ) -> tuple[Array, AtdeState]:
-    """One sample of the law at the top; `du` (..., n) is added to the robust term."""
+    """One sample of the law at the top; `du` (..., n) is added to the robust term, `m_bar` as for TDE."""
     e, ed = errors(signals)
     s = sliding_variable(e, ed, gains.k_p, gains.k_d)
     s_squared = inner(s, s)
@@ -84,5 +89,6 @@ def atde(
     grows = (state.c <= gains.c_floor) | (s_squared > inner(state.s, state.s))
     change = signed_step((period * gains.gamma_0) * np.sqrt(s_squared), grows)
     u = desired_acceleration(signals, e, ed, gains.k_p, gains.k_d) + robust
-    tau, tde_state = time_delay(gains.m_bar, state.tde, signals, u if du is None else u + du, period)
+    own = gains.m_bar if m_bar is None else m_bar
+    tau, tde_state = time_delay(own, state.tde, signals, u if du is None else u + du, period)
     return tau, AtdeState(tde_state, s, state.c + change)

@@ -12,7 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.laws.errors import GainError
-from controllers.laws.tde import Inertia
+from controllers.laws.tde import Inertia, as_matrix
+from controllers.laws.tracking import check_positive_number
+
+BLOCKED = 1e-6
+"""Eigenvalues up to this size are zero but for rounding."""
 
 
 def tde_eigenvalues(inertia: NDArray[np.floating[Any]], m_bar: Inertia) -> NDArray[np.floating[Any]]:
@@ -26,17 +30,61 @@ def tde_eigenvalues(inertia: NDArray[np.floating[Any]], m_bar: Inertia) -> NDArr
     Raises:
         GainError: for an m_bar that does not fit the inertia.
     """
-    n = inertia.shape[-1]
-    nominal = np.asarray(m_bar, dtype=np.float64)
-    if nominal.ndim < 2:
-        if nominal.size not in (1, n):
-            raise GainError("m_bar", m_bar, f"one number, {n} numbers, or a matrix {n} x {n}")
-        nominal = np.diag(np.broadcast_to(nominal, n))
-    if nominal.shape != (n, n):
-        raise GainError("m_bar", m_bar, f"one number, {n} numbers, or a matrix {n} x {n}")
     # with m_bar = R R^T the symmetric R^T M^-1 R has the same eigenvalues, and they come out real
-    root = np.linalg.cholesky(nominal)
+    root = np.linalg.cholesky(as_matrix(m_bar, inertia.shape[-1]))
     return np.linalg.eigvalsh(root.T @ np.linalg.solve(np.asarray(inertia, dtype=np.float64), root))
+
+
+def support_eigenvalues(inverse_inertia: NDArray[np.floating[Any]], m_bar: Inertia) -> NDArray[np.floating[Any]]:
+    """Eigenvalues of A m_bar, (..., n), in rising order, for joints of a robot that stands on something.
+
+    A direction in which contacts allow no acceleration has the eigenvalue zero.
+
+    Args:
+        inverse_inertia: A (..., n, n) (1/(kg m^2)), symmetric: the acceleration of the joints by a force on them, the
+            joint block of the constrained inverse inertia (`artde_gym.multibody.dynamics.constrained_inverse_inertia`).
+        m_bar: see `tde_eigenvalues`.
+
+    Raises:
+        GainError: for an m_bar that does not fit the inertia.
+    """
+    root = np.linalg.cholesky(as_matrix(m_bar, inverse_inertia.shape[-1]))
+    return np.linalg.eigvalsh(root.T @ np.asarray(inverse_inertia, dtype=np.float64) @ root)
+
+
+def support_is_valid(inverse_inertia: NDArray[np.floating[Any]], m_bar: Inertia) -> NDArray[np.bool_]:
+    """Return True if all eigenvalues of joints that stand on something are below 2, and none is negative, (...).
+
+    Directions that contacts block need no estimate: zero, up to rounding, is valid there.
+    """
+    eigenvalues = support_eigenvalues(inverse_inertia, m_bar)
+    return np.all((eigenvalues > -BLOCKED) & (eigenvalues < 2), axis=-1)
+
+
+def largest_support_m_bar(inverse_inertia: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """Compute the number m_bar below which all eigenvalues of A m_bar are below 2, (...)."""
+    return 2.0 / np.linalg.eigvalsh(np.asarray(inverse_inertia, dtype=np.float64))[..., -1]
+
+
+def support_m_bar(inverse_inertia: NDArray[np.floating[Any]], cap: float) -> NDArray[np.floating[Any]]:
+    """Derive a constant nominal inertia (n, n) for a phase of support: mean(A)^-1, its eigenvalues at most `cap`.
+
+    The cap keeps it valid in any other phase in which `largest_support_m_bar` is above it.
+
+    Args:
+        inverse_inertia: A (k, n, n) along the phase, of full rank in the mean.
+        cap: largest eigenvalue (kg m^2).
+
+    Raises:
+        GainError: for a cap that is not above zero, or a phase with directions that no force accelerates.
+    """
+    check_positive_number("cap", cap)
+    mean = np.asarray(inverse_inertia, dtype=np.float64).mean(axis=0)
+    values, vectors = np.linalg.eigh(mean)
+    if values[0] <= BLOCKED:
+        raise GainError("inverse inertia", float(values[0]), "of full rank, as on one foot")
+    matrix = (vectors * np.minimum(1.0 / values, cap)) @ vectors.T
+    return 0.5 * (matrix + matrix.T)
 
 
 def tde_is_valid(inertia: NDArray[np.floating[Any]], m_bar: Inertia) -> NDArray[np.bool_]:

@@ -58,19 +58,24 @@ class TdeGains:
 
     def __post_init__(self) -> None:
         make_plain(self)
-        allowed = "a positive number, one a joint, or a positive definite matrix"
-        try:
-            matrix = np.asarray(self.m_bar, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise GainError("m_bar", self.m_bar, allowed) from None
-        if matrix.ndim == 2:
-            symmetric = matrix.shape[0] == matrix.shape[1] and np.allclose(matrix, matrix.T)
-            if not (symmetric and np.all(np.isfinite(matrix)) and np.all(np.linalg.eigvalsh(matrix) > 0)):
-                raise GainError("m_bar", self.m_bar, allowed)
-        else:
-            check_positive("m_bar", self.m_bar)  # pyright: ignore[reportArgumentType]  # not a matrix here
+        check_inertia("m_bar", self.m_bar)
         check_positive("k_p", self.k_p)
         check_positive("k_d", self.k_d)
+
+
+def check_inertia(field: str, m_bar: Inertia) -> None:
+    """Raise GainError unless `m_bar` is a positive number, one a joint, or a positive definite matrix."""
+    allowed = "a positive number, one a joint, or a positive definite matrix"
+    try:
+        matrix = np.asarray(m_bar, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise GainError(field, m_bar, allowed) from None
+    if matrix.ndim == 2:
+        symmetric = matrix.shape[0] == matrix.shape[1] and np.allclose(matrix, matrix.T)
+        if not (symmetric and np.all(np.isfinite(matrix)) and np.all(np.linalg.eigvalsh(matrix) > 0)):
+            raise GainError(field, m_bar, allowed)
+    else:
+        check_positive(field, m_bar)  # pyright: ignore[reportArgumentType]  # not a matrix here
 
 
 class TdeState(NamedTuple):
@@ -90,21 +95,47 @@ def tde_init(signals: JointInput, period: float) -> TdeState:
 
 
 def tde(
-    gains: TdeGains, state: TdeState, signals: JointInput, period: float, du: Array | None = None
+    gains: TdeGains,
+    state: TdeState,
+    signals: JointInput,
+    period: float,
+    du: Array | None = None,
+    m_bar: Array | None = None,
 ) -> tuple[Array, TdeState]:
-    """One sample of the law at the top; `du` (..., n) is whatever is added to the desired acceleration (rad/s^2)."""
+    """One sample of the law at the top.
+
+    `du` (..., n) is whatever is added to the desired acceleration (rad/s^2); `m_bar` (..., n, n) is taken in place of
+    the gains' where it is given.
+    """
     u = desired_acceleration(signals, *errors(signals), gains.k_p, gains.k_d)
-    return time_delay(gains.m_bar, state, signals, u if du is None else u + du, period)
+    own = gains.m_bar if m_bar is None else m_bar
+    return time_delay(own, state, signals, u if du is None else u + du, period)
 
 
-def time_delay(m_bar: Inertia, state: TdeState, signals: JointInput, u: Array, period: float) -> tuple[Array, TdeState]:
+def time_delay(
+    m_bar: Inertia | Array, state: TdeState, signals: JointInput, u: Array, period: float
+) -> tuple[Array, TdeState]:
     """Return the force that makes the acceleration `u` (..., n) if the dynamics are those of one sample ago."""
     a = (signals.qd - state.qd) / period
     tau = signals.tau_applied + inertia_times(m_bar, u - a)
     return tau, TdeState(signals.qd, u, state.u - a)
 
 
-def inertia_times(m_bar: Inertia, v: Array) -> Array:
+def as_matrix(m_bar: Inertia, n: int) -> Array:
+    """Return a nominal inertia as a matrix (n, n).
+
+    Raises:
+        GainError: for one of another number of joints.
+    """
+    nominal = np.asarray(m_bar, dtype=np.float64)
+    if nominal.ndim < 2 and nominal.size in (1, n):
+        return np.diag(np.broadcast_to(nominal, n))
+    if nominal.shape != (n, n):
+        raise GainError("m_bar", m_bar, f"one number, {n} numbers, or a matrix {n} x {n}")
+    return nominal
+
+
+def inertia_times(m_bar: Inertia | Array, v: Array) -> Array:
     """m_bar v for a scalar, diagonal or full nominal inertia, in the precision of v."""
     if isinstance(m_bar, (int, float)):
         return m_bar * v

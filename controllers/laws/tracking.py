@@ -40,11 +40,12 @@ class Law(NamedTuple):
 
     Attributes:
         start: (gains, signals, period) -> memory before the first sample.
-        step: (gains, memory, signals, period) -> force (..., n), memory for the next sample.
+        step: (gains, memory, signals, period, ...) -> force (..., n), memory for the next sample; some laws take
+            further fields of the observation.
     """
 
     start: Callable[[Any, JointInput, float], LawState]
-    step: Callable[[Any, Any, JointInput, float], tuple[Array, LawState]]
+    step: Callable[..., tuple[Array, LawState]]
 
 
 def errors(signals: JointInput) -> tuple[Array, Array]:

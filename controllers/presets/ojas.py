@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 from controllers.drive import Preset, Ranges
 from controllers.laws.artde import ArtdeGains
 from controllers.laws.atde import AtdeGains
 from controllers.laws.computed_torque import ComputedTorqueGains
+from controllers.laws.switched import SwitchedArtdeGains, SwitchedAtdeGains, SwitchedTdeGains
 from controllers.laws.tde import ConstantGains, TdeGains
+from controllers.presets.ojas_support import M_BAR_LEFT, M_BAR_RIGHT
 
 _THESIS = "Dantu 2023, section 2.5.2"
 _M_BAR, _K_P, _K_D = 0.042, 25.0, 10.0
@@ -39,6 +42,23 @@ _STIFF = (
     "valid where all inertias are 15 % smaller than modeled; at 1 ms, stiffness 770 Nm/rad in place of 420"
 )
 
+SUPPORT_ACTUATORS = "rotor"
+"""Actuator model from which the support preset follows."""
+SUPPORT_M_BAR = 0.08
+"""On both feet and on none, 0.88 of the limit of 0.0909 without contact."""
+_SWITCHED: dict[str, Any] = {
+    "m_bar": SUPPORT_M_BAR,
+    "m_bar_left": M_BAR_LEFT,
+    "m_bar_right": M_BAR_RIGHT,
+    "dwell": 0.02,
+    "blend": 0.06,
+}
+_SUPPORT = (
+    "ours: the thesis' gains with mean(A)^-1 of each leg's support, its eigenvalues at most 0.09, from spec and gait "
+    "(`artde-gym design --law tde-switched`); cap, m_bar on both feet, dwell and blend from about 35 variants in S1-L4 "
+    "and S2-L4"
+)
+
 OJAS: dict[tuple[str, str], Preset] = {
     ("tde", "thesis"): Preset(_TDE, _THESIS),
     ("atde", "thesis"): Preset(
@@ -65,6 +85,9 @@ OJAS: dict[tuple[str, str], Preset] = {
             "tde+kd": _CONSTANT,
         }.items()
     },
+    ("tde-switched", "support"): Preset(SwitchedTdeGains(**{**vars(_TDE), **_SWITCHED}), _SUPPORT),
+    ("atde-switched", "support"): Preset(SwitchedAtdeGains(**{**vars(_ATDE), **_SWITCHED}), _SUPPORT),
+    ("artde-switched", "support"): Preset(SwitchedArtdeGains(**{**vars(_ARTDE), **_SWITCHED}), _SUPPORT),
 }
 """(law, preset) -> gains."""
 
@@ -77,5 +100,8 @@ OJAS_RANGES: dict[str, Ranges] = {
     "artde": {**_DELAYED, "alpha": (0.5, 20.0), "gamma_0": (10.0, 5000.0), "gamma_1": (10.0, 5000.0)},
     "tde+c": {**_DELAYED, "alpha": (0.5, 20.0), "c": (0.01, 10.0)},
     "computed-torque": _FEEDBACK,
+    "tde-switched": _FEEDBACK,
+    "atde-switched": {**_FEEDBACK, "alpha": (0.5, 20.0), "gamma_0": (10.0, 5000.0)},
+    "artde-switched": {**_FEEDBACK, "alpha": (0.5, 20.0), "gamma_0": (10.0, 5000.0), "gamma_1": (10.0, 5000.0)},
 }
 """Law -> ranges: a decade or so about the thesis' gains."""

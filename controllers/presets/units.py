@@ -4,6 +4,10 @@ from __future__ import annotations
 
 _UNITS = {
     "m_bar": "{inertia}",
+    "m_bar_left": "{inertia}",
+    "m_bar_right": "{inertia}",
+    "dwell": "s",
+    "blend": "s",
     "inertia": "kg m^2",
     "k_p": "1/s^2",
     "k_d": "1/s",

@@ -69,6 +69,29 @@ def test_the_thesis_pattern_holds_in_a_table_that_shows_it() -> None:
     assert found["S2", "ARTDE survives a larger ground force than ATDE, and ATDE than TDE"] == "not measured"
 
 
+def test_claims_of_the_laws_that_switch() -> None:
+    errors = {
+        "tde": 1.0,
+        "tde-stiff": 0.6,
+        "tde-switched": 0.5,
+        "artde": 0.4,
+        "artde-stiff": 0.35,
+        "artde-switched": 0.36,
+    }
+    found = verdicts(walks(errors, "S1-L4"), walks(errors, "S2-L4", fell=("tde-switched",)))
+    for law, stiff in (("TDE", "holds"), ("ARTDE", "does not hold")):
+        own = f"{law} that switches with the support phase beats {law}"
+        assert found["S1-L4", f"{own} at the preset stiff, 0.077"] == stiff
+        assert found["S1-L4", f"{own} at the thesis' m_bar of 0.042"] == "holds"
+    assert (
+        found["S2-L4", "TDE that switches with the support phase beats TDE at the preset stiff, 0.077"]
+        == "does not hold"
+    )
+    own = [claim for claim in CLAIMS if "switches" in claim.text]
+    assert all(claim.takes[0].endswith("-switched") for claim in own)
+    assert {claim.scenario for claim in own} >= {"S1", "S3-L4", "S2-GRF33", "S3-GRF45"}
+
+
 @pytest.mark.parametrize(("ratio", "outcome"), [(1.02, "holds"), (0.9, "does not hold"), (1.05, "undecided")])
 def test_a_payload_that_changes_nothing_needs_no_pairs(ratio: float, outcome: str) -> None:
     both = pd.concat([walks({"artde": ratio}, "A", first=50), walks({"artde": 1.0}, "B")], ignore_index=True)
@@ -124,6 +147,7 @@ def test_reproduce_runs_the_grids_behind_claims(tmp_path: Path, monkeypatch: pyt
     assert found.curves["S2", "grf_pulse.magnitude"].levels["episodes"].tolist() == [2] * 6
     verdict = found.claims.set_index("claim").loc["ARTDE survives a larger ground force than ATDE, and ATDE than TDE"]
     assert verdict["verdict"] == "undecided"  # 0.3 s of standing topples nobody at any level
+    assert not found.claims["claim"].str.contains("switches").any()  # these controllers did not walk
     without = reproduce("biped", tmp_path, scenarios=["S2"], controllers=names, episodes=2)
     assert not without.claims["claim"].str.contains("survives a larger ground force").any()
 

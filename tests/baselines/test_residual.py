@@ -36,7 +36,8 @@ SLOW = {"computed-torque"}
 LAWS = list(registered_controllers())
 SLUNG = {"geometric-load", "tde+swing", "atde+swing", "artde+swing"}
 QUADROTOR_ONLY = {"asmc", "indi", "geometric", *SLUNG}
-BIPED_ONLY = {"computed-torque", "tde+balance", "tde-stiff"}
+SWITCHED = {"tde-switched", "atde-switched", "artde-switched"}
+BIPED_ONLY = {"computed-torque", "tde+balance", "tde-stiff", "artde-stiff", *SWITCHED}
 CASES = [
     (env_id, base)
     for env_id, (name, _) in ENVIRONMENTS.items()

@@ -14,7 +14,18 @@ from artde_gym.errors import OptionError, UnknownNameError
 from artde_gym.robots.ojas.task import OBSERVATION
 from controllers.laws.errors import GainError
 
-LAWS = ["tde", "atde", "artde", "artde-robust", "pid", "tde+c", "tde+kd"]
+LAWS = [
+    "tde",
+    "atde",
+    "artde",
+    "artde-robust",
+    "pid",
+    "tde+c",
+    "tde+kd",
+    "tde-switched",
+    "atde-switched",
+    "artde-switched",
+]
 POLICIES = [*LAWS, "computed-torque"]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from artde_gym.robots.ojas.thesis import JOINTS
-from artde_gym.studies.reproduce.claims import ADDED, Claim, adapts, falls, improves, outlasts, repeats, stays
+from artde_gym.studies.reproduce.claims import ADDED, Claim, adapts, beats, falls, improves, outlasts, repeats, stays
 
 _FALL = {"tde": True, "atde": True, "artde": False}
 _WALK = {"tde": False, "atde": False, "artde": False}
@@ -96,5 +96,18 @@ CLAIMS: tuple[Claim, ...] = (
         )
         for suffix in _ALL
         for name in ("S1", "S2", "S3")
+    ),
+    *(
+        Claim(
+            f"{name}{suffix}",
+            f"{law.upper()} that switches with the support phase beats {law.upper()} {said}",
+            ADDED,
+            beats(f"{name}{suffix}", f"{law}-switched", rival.format(law), "rmse_deg"),
+            takes=(f"{law}-switched", rival.format(law)),
+        )
+        for suffix in _ALL
+        for name in ("S1", "S2", "S3")
+        for law in ("tde", "artde")
+        for rival, said in (("{}", "at the thesis' m_bar of 0.042"), ("{}-stiff", "at the preset stiff, 0.077"))
     ),
 )

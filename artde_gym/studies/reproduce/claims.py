@@ -49,6 +49,7 @@ class Claim:
         judge: episodes -> verdict.
         ablation: whether it takes the ablation of `artde_gym.studies.reproduce.reproduction`.
         curve: what a grid of `frontier` varies, that `judge` is given in place of episodes in the scenario.
+        takes: controllers beside those that `reproduce` runs by default; without them it leaves the claim out.
     """
 
     scenario: str
@@ -57,6 +58,7 @@ class Claim:
     judge: Callable[[Any], Verdict]
     ablation: bool = False
     curve: str | None = None
+    takes: tuple[str, ...] = ()
 
 
 def improves(
@@ -141,12 +143,17 @@ def stays(scenario: str, other: str, metric: str, axes: Sequence[str], most: flo
 
 def adapts(scenario: str, rival: str, metric: str) -> Callable[[Result], Verdict]:
     """Claim that ARTDE beats a TDE without adaptation: fewer falls, or a smaller error if as many finish."""
+    return beats(scenario, "artde", rival, metric)
+
+
+def beats(scenario: str, name: str, rival: str, metric: str) -> Callable[[Result], Verdict]:
+    """Claim that a controller beats a rival: fewer falls, or a smaller error if as many finish."""
 
     def judge(result: Result) -> Verdict:
-        rivals = ("artde", rival)
+        rivals = (name, rival)
         if missing := _missing(result, scenario, rivals):
             return missing
-        (ours, rate), (theirs, other) = (result.falls(scenario, name) for name in rivals)
+        (ours, rate), (theirs, other) = (result.falls(scenario, one) for one in rivals)
         error = statistics.improvement(*result.pairs(scenario, *rivals, metric))
         measured = f"falls {ours}/{rate.n} against {theirs}/{other.n}; RMSE better by {_interval(error)} %"
         if rate.high < other.low or (ours <= theirs and error.low > 0):

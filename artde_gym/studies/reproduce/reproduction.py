@@ -146,6 +146,7 @@ def reproduce(
         claim
         for claim in all_claims()
         if claim.scenario in result.scenarios and (ablation or not claim.ablation) and (curves or not claim.curve)
+        if set(claim.takes) <= set(result.controllers)
     ]
     found: dict[tuple[str, str], Frontier] = {}
     for key in dict.fromkeys((claim.scenario, claim.curve) for claim in made if claim.curve):

@@ -1,0 +1,252 @@
+"""The walks behind docs/laws/switched.md: laws that switch with the support phase against laws that do not.
+
+python scripts/switching.py held-out   gaits, frictions and payloads by which nothing was chosen; S1 to S3, 1 and 4 ms,
+                                       without and with the ground force
+python scripts/switching.py tables     the tables of what there is of that
+python scripts/switching.py flags      S1-L4 and S2-L4 with contact flags that lie
+
+All in MuJoCo, in vector environments and one process; walks of 20 s. A world is a gait, a friction and a payload, with
+one walk under each law. A part that is in the folder already is not run again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pandas as pd
+
+import artde_gym  # noqa: F401  (registers the environments)
+import controllers
+from artde_gym.evaluation import statistics
+from artde_gym.evaluation.seeds import episode_seed
+from artde_gym.evaluation.side_by_side import SideBySide
+from artde_gym.evaluation.vector_rollout import run_vector
+from artde_gym.robots.ojas.task import OBSERVATION
+from artde_gym.scenarios import SCENARIOS
+from controllers.drive import DRIVES
+
+GAITS = ((0.06, 1.3), (0.14, 0.8), (0.06, 0.8), (0.14, 1.3))  # m/s, s a step; the gains are those of 0.1 m/s and 1 s
+GROUNDS = ((0.55, 0.8), (1.0, 1.9))  # friction, payload in kg; the prototype knew 0.7 to 0.9 and 1.3 kg
+FORMS = ("S1", "S2", "S3")
+SHARES = (0, 45, 33)  # ground force, % of the weight
+PARTS = [(4, share, gait) for share in (0, 45) for gait in (0, 1)] + [(1, share, 1) for share in (0, 45)]
+PARTS += [(4, share, gait) for share, gait in ((0, 2), (45, 2), (0, 3), (45, 3), (33, 0), (33, 1), (33, 2), (33, 3))]
+PARTS += [(1, share, gait) for share, gait in ((0, 0), (45, 0), (33, 1), (33, 0))]
+"""L in ms, ground force, number of the gait, in the order in which they are run."""
+DURATION, PUSHES = 20.0, (8.0, 13.0)  # s; of S3, which has them at 28 and 37 s
+SEED = 1919
+TOUCHDOWN, UNLOADED = 0.06, 0.2  # s after a landing, s of no load before it
+
+_SWITCHED = DRIVES["ojas"].presets["tde-switched", "support"].gains
+_LEFT, _BOTH, _RIGHT = _SWITCHED.matrices(12, np.float64)
+MEAN = (0.405 * (_LEFT + _RIGHT) + 0.19 * _BOTH).tolist()  # the same matrices, each for its share of the time
+LAWS: dict[str, tuple[str, dict[str, Any]]] = {
+    f"{law.upper()}, {text}": (name.format(law), gains)
+    for law in ("tde", "artde")
+    for text, name, gains in (
+        ("0.042", "{}", {}),
+        ("0.077", "{}", {"preset": "stiff"}),
+        ("mean matrix", "{}", {"m_bar": MEAN}),
+        ("switched", "{}-switched", {}),
+    )
+}
+COLUMNS = {"rmse_deg": ("RMS error", "deg", 3), "torque_variation_nm_s": ("torque variation", "Nm/s", 1),
+           "landing_n": ("landing force", "N", 0)}  # fmt: skip
+
+
+class Landings:
+    """A vector environment that keeps the loads of the feet."""
+
+    def __init__(self, env: Any, change: Callable[[Any], Any] = lambda observation: observation) -> None:
+        self.unwrapped, self.num_envs, self._change = env, env.num_envs, change
+        self.loads: list[Any] = []
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.unwrapped, name)
+
+    def reset(self, **options: Any) -> tuple[Any, Any]:
+        observation, info = self.unwrapped.reset(**options)
+        return self._change(observation), info
+
+    def step(self, action: Any) -> tuple[Any, ...]:
+        observation, *rest = self.unwrapped.step(action)
+        self.loads.append(rest[-1]["foot_loads"].astype(np.float32))
+        return self._change(observation), *rest
+
+    def peaks(self, robot: int, steps: int) -> list[float]:
+        """Return the largest load (N) after each touchdown of a walk."""
+        period = self.unwrapped.control_period
+        after, before = round(TOUCHDOWN / period), round(UNLOADED / period)
+        loads = np.array([load[robot] for load in self.loads[:steps]])
+        found: list[float] = []
+        for load in loads.T:
+            on = np.concatenate([[0], np.cumsum(load > 1.0)])
+            lands = (load[before:] > 1.0) & (on[before:-1] == on[: -before - 1])
+            found += [float(load[k : k + after].max()) for k in np.flatnonzero(lands) + before]
+        return found
+
+
+def scenario(name: str, share: int, friction: float, mass: float) -> dict[str, Any]:
+    """Disturbances of S1, S2 or S3 on another ground with another payload, and pushes early enough for a short walk."""
+    given = dict(SCENARIOS[name].disturbances)
+    pushes = given["push"]
+    given |= {"friction": friction, "push": [pushes[0]] + [
+        {**push, "start": start} for push, start in zip(pushes[1:], PUSHES, strict=False)
+    ]}  # fmt: skip
+    if "payload" in given:
+        given["payload"] = {**given["payload"], "mass": mass}
+    if share:
+        given["grf_pulse"] = {"shape": "double_hump", "share": share / 100, "duration": 1.0, "trigger": "contact"}
+    return given
+
+
+def walks(
+    rows: Sequence[tuple[str, dict[str, Any], int, dict[str, Any]]],
+    change: Callable[[Any], Any] = lambda observation: observation,
+    **kwargs: Any,
+) -> pd.DataFrame:
+    """Walk all rows at once: (law, disturbances, number of the seed, what else to say of it)."""
+    made = gym.make_vec("BipedPush-v0", len(rows), "vector_entry_point", engine="mujoco", disturbances={},
+                        duration=DURATION, autoreset_mode="Disabled", **kwargs)  # fmt: skip
+    env = Landings(made.unwrapped, change)
+    policies = {law: controllers.make(LAWS[law][0], env.unwrapped, **LAWS[law][1]) for law in {row[0] for row in rows}}
+    together = SideBySide([policies[row[0]] for row in rows], [row[0] for row in rows])
+    seeds = [episode_seed(SEED, row[2]) for row in rows]
+    episodes = run_vector(env, together, seeds, options={"disturbances": [row[1] for row in rows]})
+    found: list[dict[str, Any]] = []
+    for i, ((law, _, number, more), episode) in enumerate(zip(rows, episodes, strict=True)):
+        peaks = env.peaks(i, round(episode.row["duration_s"] / env.control_period))
+        landing = float(np.mean(peaks)) if peaks else np.nan
+        found.append({**more, "law": law, "world": number, **episode.row, "landing_n": landing})
+    env.close()
+    return pd.DataFrame(found)
+
+
+def part(milliseconds: int, share: int, gait: int) -> pd.DataFrame:
+    """Walk S1 to S3 on both grounds with a gait under all laws."""
+    rows: list[tuple[str, dict[str, Any], int, dict[str, Any]]] = []
+    for name, (ground, (friction, mass)), law in itertools.product(FORMS, enumerate(GROUNDS), LAWS):
+        world = len(GROUNDS) * gait + ground
+        rows.append((law, scenario(name, share, friction, mass), world, {"form": name, "share": share}))
+    speed, step_duration = GAITS[gait]
+    found = walks(rows, control_period=milliseconds / 1000, speed=speed, step_duration=step_duration)
+    return found.assign(ms=milliseconds)
+
+
+def held_out(folder: Path) -> None:
+    files = [folder / f"held-out-{ms}ms-{share}-{gait}.csv" for ms, share, gait in PARTS]
+    for file, chosen in zip(files, PARTS, strict=True):
+        if not file.exists():
+            part(*chosen).to_csv(file, index=False)
+    print(tables(folder))
+
+
+def tables(folder: Path) -> str:
+    """Return the tables of the parts in the folder."""
+    found = pd.concat(pd.read_csv(file) for file in sorted(folder.glob("held-out-*.csv")))
+    text: list[str] = []
+    for ms, name, share in itertools.product((4, 1), FORMS, sorted(SHARES)):
+        chosen = found.loc[(found["ms"] == ms) & (found["form"] == name) & (found["share"] == share)]
+        if len(chosen):
+            text.append(f"{name}, L = {ms} ms, ground force {share} %\n\n{table(chosen)}\n")
+    return "\n".join(text)
+
+
+def table(found: pd.DataFrame) -> str:
+    """Return each law's means over the walks that end, and the ratios of the switched law to its rivals."""
+    lines = ["| law | fell | " + " | ".join(f"{text}, {unit}" for text, unit, _ in COLUMNS.values()) + " |"]
+    lines.append("|---|" + "---|" * (1 + len(COLUMNS)))
+    by_law = {law: found[found["law"] == law].set_index("world").sort_index() for law in LAWS}
+    for law, rows in by_law.items():
+        whole = rows.loc[~rows["fell"].astype(bool)]
+        cells = [f"{whole[column].mean():.{digits}f}" for column, (_, _, digits) in COLUMNS.items()]
+        lines.append(f"| {law} | {len(rows) - len(whole)}/{len(rows)} | " + " | ".join(cells) + " |")
+    lines += [
+        "",
+        "| switched / rival, worlds where both walk | worlds | "
+        + " | ".join(text for text, _, _ in COLUMNS.values())
+        + " |",
+    ]
+    lines.append("|---|" + "---|" * (1 + len(COLUMNS)))
+    for law in LAWS:
+        own = law.split(",")[0] + ", switched"
+        if law != own:
+            lines.append(ratios(law, by_law[own], by_law[law]))
+    return "\n".join(lines)
+
+
+def ratios(rival: str, ours: pd.DataFrame, theirs: pd.DataFrame) -> str:
+    """Return a row of ratios of means with 95 % intervals (bootstrap over worlds)."""
+    both = ours.index[(~ours["fell"].astype(bool) & ~theirs["fell"].astype(bool)).to_numpy()]
+    cells: list[str] = []
+    for column in COLUMNS:
+        gain = statistics.improvement(ours.loc[both, column], theirs.loc[both, column])
+        value, low, high = (1 - one / 100 for one in (gain.value, gain.high, gain.low))
+        cells.append(f"{value:.2f} ({low:.2f}..{high:.2f})" if gain.n > 1 else "")
+    return f"| {rival} | {len(both)} | " + " | ".join(cells) + " |"
+
+
+def lying(kind: str, contact: slice) -> Callable[[Any], Any]:
+    """Return a function that falsifies the contact flags in observations, one after the other."""
+    before: list[Any] = []
+    sides = {"left": [contact.start], "both": [contact.start, contact.start + 1]}
+
+    def change(observation: Any) -> Any:
+        observation = np.array(observation)
+        word, _, rest = kind.partition(" ")
+        if word == "late":
+            before.append(observation[:, contact].copy())
+            observation[:, contact] = before[max(0, len(before) - 1 - int(rest))]
+        elif word in sides:
+            observation[:, sides[word]] = 1.0 if rest == "on" else 0.0
+        return observation
+
+    return change
+
+
+LIES = {
+    "honest": "",
+    "left always on": "left on",
+    "left never on": "left off",
+    "both always on": "both on",
+    "12 ms late": "late 3",
+    "20 ms late": "late 5",
+}
+
+
+def flags(folder: Path, walked: int = 4) -> None:
+    laws = ("TDE, switched", "ARTDE, switched")
+    print("| flags | scenario | law | fell | RMS error, deg |\n|---|---|---|---|---|")
+    for text, kind in LIES.items():
+        rows = [
+            (law, dict(SCENARIOS[name].disturbances), number, {"form": name})
+            for name in ("S1-L4", "S2-L4")
+            for law in laws
+            for number in range(walked)
+        ]
+        found = walks(rows, lying(kind, OBSERVATION["contact"]), control_period=0.004)
+        found.to_csv(folder / f"flags-{text.replace(' ', '-')}.csv", index=False)
+        for first in range(0, len(rows), walked):
+            cell = found.iloc[first : first + walked]
+            fell = int(cell["fell"].sum())
+            error = cell.loc[~cell["fell"].astype(bool), "rmse_deg"].mean()
+            print(f"| {text} | {rows[first][3]['form']} | {rows[first][0]} | {fell}/{walked} | {error:.3f} |")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("figure", choices=("held-out", "tables", "flags"))
+    parser.add_argument("--out", type=Path, default=Path("runs/switching"))
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    {"held-out": held_out, "tables": lambda folder: print(tables(folder)), "flags": flags}[options.figure](options.out)
+
+
+if __name__ == "__main__":
+    main()
