@@ -41,7 +41,7 @@ class Link:
     """A rigid body and the joint that carries it.
 
     Attributes:
-        mass: kg, above zero; a link without a joint may have neither mass nor inertia.
+        mass: kg, above zero; a mere frame has neither mass nor inertia, a link on a fixed joint may lack a mass.
         com: center of mass in the link frame (m).
         inertia: moments about the center of mass, along the link's axes (kg m^2); with `products` the principal ones
             must satisfy the triangle inequality, or engines discard the whole tensor.
@@ -78,9 +78,10 @@ class Link:
     coulomb: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.axis is None and not any((self.mass, *self.inertia, *self.products)):
-            return
-        if not (math.isfinite(self.mass) and self.mass > 0):
+        if not any((self.mass, *self.inertia, *self.products)):
+            return  # a frame, such as a tool's; `RobotSpec.merged` gives it the mass of links fixed to it
+        held = self.axis is None and self.parent is not None
+        if not (math.isfinite(self.mass) and (self.mass > 0 or (held and self.mass == 0))):
             raise RobotError(f"mass of link {self.name!r}", self.mass, "a finite number > 0 kg")
         smallest, middle, largest = self._principal()
         if not (smallest > 0 and smallest + middle >= largest and math.isfinite(largest)):
