@@ -50,8 +50,8 @@ def manipulator(
     names = _names(tree, chain)
     parts = tuple(_part(link, names, tree.file) for link in tree.links)
     joints = tuple(names[link.name] for link in chain)
-    sites: dict[str, tuple[str, Vector]] = {link.name: (names[link.name], (0.0, 0.0, 0.0)) for link in tree.links[1:]}
-    sites[TOOL] = names[end], (0.0, 0.0, 0.0)
+    sites: dict[str, tuple[str, Vector]] = {TOOL: (names[end], (0.0, 0.0, 0.0))}
+    sites |= {link.name: (names[link.name], (0.0, 0.0, 0.0)) for link in tree.links[1:] if link.name != TOOL}
     given = tuple(link.joint.armature for link in chain if link.joint is not None)
     spec = RobotSpec(
         name="arm",

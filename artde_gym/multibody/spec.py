@@ -57,6 +57,7 @@ class Link:
         speed: largest speed of the joint (rad/s or m/s).
         damping: viscous friction of the joint (Nm s/rad or N s/m).
         coulomb: dry friction of the joint (Nm or N).
+        slip: speed at which dry friction reaches tanh(1) = 76 % of it (rad/s or m/s).
     """
 
     name: str
@@ -76,6 +77,7 @@ class Link:
     speed: float = math.inf
     damping: float = 0.0
     coulomb: float = 0.0
+    slip: float = 0.05
 
     def __post_init__(self) -> None:
         if not any((self.mass, *self.inertia, *self.products)):

@@ -160,6 +160,8 @@ class BulletEngine:
             )
             bullet.changeConstraint(constraint, gearRatio=-gear.ratio, maxForce=GEAR_FORCE, erp=0.0, **client)
             self._gears.append(constraint)
+        if self._carried is not None:
+            self._fresh = bullet.saveState(**client)
         return robot
 
     def reset(self, position: Vector, q: Array) -> None:
@@ -384,22 +386,23 @@ class BulletEngine:
         carried = self._carried
         if carried is None:
             return
+        states = {name: bullet.getJointState(self._robot, joint, physicsClientId=self._client)[:2]
+                  for name, joint in self._links.items() if joint >= 0}  # fmt: skip
         if position != carried.position:
-            states = {name: bullet.getJointState(self._robot, joint, physicsClientId=self._client)[:2]
-                      for name, joint in self._links.items() if joint >= 0}  # fmt: skip
             for gear in self._gears:
                 bullet.removeConstraint(gear, physicsClientId=self._client)
+            bullet.removeState(self._fresh, physicsClientId=self._client)
             bullet.removeBody(self._robot, physicsClientId=self._client)
             carried.position = position
             self._robot = self._build_robot()
-            for name, (angle, rate) in states.items():
-                bullet.resetJointState(self._robot, self._links[name], angle, rate, physicsClientId=self._client)
             scales, self._scales = self._scales, (1.0, {}, 1.0)
             self.scale_masses(*scales)
+        bullet.restoreState(self._fresh, physicsClientId=self._client)  # also without a rebuild: no solver's memory
+        for name, (angle, rate) in states.items():
+            bullet.resetJointState(self._robot, self._links[name], angle, rate, physicsClientId=self._client)
         carried.mass, carried.fall = mass, fall
-        moments = [carried.moment] * 3
-        heavy = {"mass": max(mass, MASSLESS), "localInertiaDiagonal": moments, "physicsClientId": self._client}
-        bullet.changeDynamics(self._robot, self._links[PAYLOAD], **heavy)
+        heavy = {"mass": max(mass, MASSLESS), "localInertiaDiagonal": [carried.moment] * 3}
+        bullet.changeDynamics(self._robot, self._links[PAYLOAD], **heavy, physicsClientId=self._client)
 
     def _release(self, carried: Carried) -> None:
         """Let the payload of a fixed robot fall."""
@@ -430,7 +433,7 @@ class BulletEngine:
 
     def _remove_payload(self) -> None:
         if self._carried is not None:
-            self._carry(0.0, self._carried.position, None)
+            self._carry(0.0, self._carried.home, None)
             return
         self.release_payload()
         if self._payload is not None:

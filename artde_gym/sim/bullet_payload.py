@@ -32,6 +32,7 @@ class Carried:
 
     Attributes:
         mass: kg; 0 without one.
+        home: a usual position, at which the robot need not be built anew: its first site on the link (m).
         position: of its center in the frame of the carrying link (m).
         fall: its release; None if it was not.
     """
@@ -39,7 +40,8 @@ class Carried:
     def __init__(self, spec: RobotSpec) -> None:
         self._spec = spec
         self.mass = 0.0
-        self.position: Vector = (0.0, 0.0, 0.0)
+        self.home = next((point for _, link, point in spec.sites if link == spec.payload_link), (0.0, 0.0, 0.0))
+        self.position: Vector = self.home
         self.fall: Fall | None = None
 
     @property
