@@ -25,13 +25,13 @@ PAYLOAD = "payload"
 """The site at which a payload is pushed, of robots with the capability "cable"."""
 
 Capability = Literal[
-    "actuators", "armature", "cable", "contact", "effects", "encoders", "feet", "flight", "joints", "legs", "mass",
-    "payload", "rotors", "sensors", "sites", "torque_limit",
+    "actuators", "armature", "cable", "contact", "effects", "encoders", "feet", "flight", "friction", "joints", "legs",
+    "mass", "payload", "rotors", "sensors", "sites", "torque_limit",
 ]  # fmt: skip
 """Properties of a robot and its environments that kinds of disturbances require.
 
 "effects": the environments apply registered kinds through `artde_gym.disturbances.effects.Effects`. "cable": a payload
-may hang on one.
+may hang on one. "friction": joints have friction.
 """
 Harder = Literal["larger", "smaller"]
 

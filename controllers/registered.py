@@ -35,7 +35,7 @@ CONTROLLERS = (
         "computed-torque",
         "controllers.model_based:make_computed_torque",
         {},
-        "biped: feedback linearization with the nominal model (upper reference)",
+        "biped, arm: feedback linearization with the nominal model (upper reference)",
         "controllers.model_based:tuning_space",
     ),
 )

@@ -222,7 +222,7 @@ except OptionError as error:
     print(error)
 """
     short = ["--episodes", "1", "--workers", "1", "--env-kwargs", '{"duration": 0.2}', "--out", "run"]
-    said = run(tmp_path, site, code, [["evaluate", "--scenario", "A1", "--controllers", "rest,tde", *short]])
+    said = run(tmp_path, site, code, [["evaluate", "--scenario", "L1", "--controllers", "rest,tde", *short]])
     assert "any name except" in said
     assert sorted(pd.read_csv(tmp_path / "run/episodes.csv")["controller"]) == ["rest", "tde"]
 

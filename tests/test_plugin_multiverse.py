@@ -13,7 +13,7 @@ pytest.importorskip("pyarrow", reason="pyarrow is not installed (extra sweep)")
 pytest.importorskip("yaml", reason="pyyaml is not installed (extra sweep)")
 
 DESIGN = {
-    "scenario": "A1",
+    "scenario": "L1",
     "env_kwargs": {"duration": 0.4},
     "controllers": ["tde", "artde"],
     "worlds": 3,

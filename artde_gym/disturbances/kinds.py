@@ -114,8 +114,9 @@ OWN: dict[str, DisturbanceSpec] = {
     for kind in (
         DisturbanceSpec(
             "payload",
-            "A ball fixed to the base, or hanging under it on a cable, which neither stretches nor weighs anything and "
-            "goes slack; see `artde_gym.sim.cable`. While it is there, the site `payload` is where it can be pushed.",
+            "A ball fixed to the base, of an arm to its last link, or hanging under it on a cable, which neither "
+            "stretches nor weighs anything and goes slack; see `artde_gym.sim.cable`. While it is there, the site "
+            "`payload` is where it can be pushed.",
             (
                 Parameter("mass", "kg", 1e-3, 5.0, None, "mass of the ball"),
                 Parameter(
@@ -124,7 +125,8 @@ OWN: dict[str, DisturbanceSpec] = {
                     -0.5,
                     0.5,
                     (0.0, 0.0, 0.16),
-                    "its center in the base frame; with a cable, the hook's place",
+                    "its center in the base frame, of an arm from the tool along its last link's axes; with a cable, "
+                    "the hook's place",
                     size=3,
                     with_other=("cable", HOOK),
                 ),
@@ -352,6 +354,13 @@ OWN: dict[str, DisturbanceSpec] = {
             ),
             shorthand="time_constant",
             requires="contact",
+        ),
+        DisturbanceSpec(
+            "joint_friction",
+            "The joints' friction is larger or smaller than that of the nominal model.",
+            (Parameter("scale", "1", 0.0, 10.0, None, "true over nominal viscous and dry friction"),),
+            shorthand="scale",
+            requires="friction",
         ),
         DisturbanceSpec(
             "torque_limit",

@@ -1,9 +1,9 @@
-"""Disturbances of one walking episode."""
+"""Disturbances of one episode of a robot with joints."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -11,8 +11,21 @@ from artde_gym.arrays import Array
 from artde_gym.disturbances.actuation import Actuation
 from artde_gym.disturbances.schedule import Schedule
 from artde_gym.disturbances.sensing import Sensing
-from artde_gym.robots.ojas.task import OBSERVATION, TIME_STEP, Walk
+from artde_gym.layout import Layout
+from artde_gym.multibody.spec import RobotSpec
+from artde_gym.robots.ojas.task import OBSERVATION, TIME_STEP
 from artde_gym.sim.engine import World
+
+
+class Task(Protocol):
+    """The part of a task that disturbances need."""
+
+    @property
+    def nominal_robot(self) -> RobotSpec: ...
+    @property
+    def substeps(self) -> int: ...
+    @property
+    def control_period(self) -> float: ...
 
 
 class EpisodeDisturbances:
@@ -22,22 +35,23 @@ class EpisodeDisturbances:
 
     Args:
         sampled: sampled disturbances.
-        walk: the disturbed walk.
+        walk: the disturbed walk, or another task.
         rng: generator of the environment.
+        layout: layout of the observation.
 
     Attributes:
         schedule: schedule of pushes and the payload.
         sensing: disturbances of the observations; None without any.
     """
 
-    def __init__(self, sampled: Mapping[str, Any], walk: Walk, rng: np.random.Generator) -> None:
+    def __init__(
+        self, sampled: Mapping[str, Any], walk: Task, rng: np.random.Generator, layout: Layout = OBSERVATION
+    ) -> None:
         kinds = sampled.keys()
         self.schedule = Schedule(sampled, TIME_STEP)
         joints = walk.nominal_robot.actuated
         self._actuation = None if kinds.isdisjoint(Actuation.KINDS) else Actuation(sampled, joints, TIME_STEP)
-        self.sensing = (
-            None if kinds.isdisjoint(Sensing.KINDS) else Sensing(sampled, OBSERVATION, walk.control_period, rng)
-        )
+        self.sensing = None if kinds.isdisjoint(Sensing.KINDS) else Sensing(sampled, layout, walk.control_period, rng)
         self._target = self._total = np.zeros(len(joints))
         self._substeps = walk.substeps
 

@@ -57,7 +57,7 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
     action_layout: Layout
     observation_layout: Layout
     robot_name: ClassVar[str]
-    metrics_spec: ClassVar[MetricsSpec]
+    metrics_spec: MetricsSpec
     reward_scales: ClassVar[Mapping[str, float]]
     fall_reasons: ClassVar[Sequence[str]]
     allowed_action: ClassVar[str]

@@ -1,6 +1,6 @@
 """Rigid-body dynamics of a `RobotSpec` in NumPy, batched over leading axes.
 
-A floating-base tree with generalized velocity v = [v_base; w_base; qd], all base quantities in world axes at the base
+A tree with generalized velocity v = [v_base; w_base; qd], all base quantities in world axes at the base
 link's origin:
 
     M(q) dv/dt + h(q, v) = [wrench on the base; tau]
@@ -10,7 +10,8 @@ Every sum runs over the moving links b with Jacobians J_v,b of the center of mas
     M   = sum_b  m_b J_v^T J_v + J_w^T I_b J_w
     tau = sum_b  J_v^T m_b (a_b + g z) + J_w^T (I_b alpha_b + w_b x I_b w_b)
 
-the second one as Newton-Euler sums over the links that each joint carries. Rotor links follow their gear, so that `n`
+the second one as Newton-Euler sums over the links that each joint carries. Of a robot whose base is fixed, only the
+joints' part matters: `joint_mass_matrix` and `joint_torques`. Rotor links follow their gear, so that `n`
 counts only independent joints. Source: Featherstone, Rigid Body Dynamics Algorithms (2008), chapters 2 and 5; the form
 with explicit Jacobians is Siciliano et al., Robotics (2009), section 7.2.
 """
@@ -49,11 +50,15 @@ class RigidBodyTree:
         self._index = {link.name: b for b, link in enumerate(links)}
         self._mass = np.array([link.mass for link in links])
         self._com = np.array([link.com for link in links])
-        self._inertia = np.array([np.diag(link.inertia) for link in links])
+        self._inertia = np.array([link.tensor for link in links])
         moving = links[1:]
         self._parent = [0] + [self._index[str(link.parent)] for link in moving]
         self._offset = np.array([link.origin for link in moving]).reshape(-1, 3)
         self._axis = np.array([link.axis for link in moving], dtype=np.float64).reshape(-1, 3)
+        at_zero = [np.eye(3) if link.rotation is None else np.array(link.rotation) for link in moving]
+        self._at_zero = None if all(link.rotation is None for link in moving) else np.array(at_zero)
+        self._slides = np.array([link.prismatic for link in moving], dtype=np.bool_)
+        self._sliding = bool(self._slides.any())
         self._supports = np.zeros((len(links), len(moving)))  # [b, j]: joint j moves link b
         for b in range(1, len(links)):
             self._supports[b] = self._supports[self._parent[b]]
@@ -77,17 +82,21 @@ class RigidBodyTree:
         return len(self.joints)
 
     def frames(self, q: Array, rot_base_to_world: Array | None = None) -> Frames:
-        """Compute forward kinematics of joint angles `q` (..., n) (rad)."""
+        """Compute forward kinematics of joint positions `q` (..., n) (rad or m)."""
         angles = q @ self._transmission.T
         bodies = len(self._mass)
         rot = np.empty((*q.shape[:-1], bodies, 3, 3))
         origin = np.zeros((*q.shape[:-1], bodies, 3))
         rot[..., 0, :, :] = np.eye(3) if rot_base_to_world is None else rot_base_to_world
-        turn = _rotations(self._axis, angles)
+        turn = _rotations(self._axis, np.where(self._slides, 0.0, angles) if self._sliding else angles)
+        if self._at_zero is not None:
+            turn = self._at_zero @ turn
         for b in range(1, bodies):
             parent = self._parent[b]
             origin[..., b, :] = origin[..., parent, :] + rot[..., parent, :, :] @ self._offset[b - 1]
             rot[..., b, :, :] = rot[..., parent, :, :] @ turn[..., b - 1, :, :]
+            if self._slides[b - 1]:
+                origin[..., b, :] += (rot[..., b, :, :] @ self._axis[b - 1]) * angles[..., b - 1, None]
         com = origin + (rot @ self._com[..., None])[..., 0]
         axis = (rot[..., 1:, :, :] @ self._axis[..., None])[..., 0]
         return Frames(rot, origin, com, axis)
@@ -128,6 +137,8 @@ class RigidBodyTree:
         force_carried = np.einsum("bj,...bi->...ji", self._supports, force)
         moment_carried = np.einsum("bj,...bi->...ji", self._supports, moment)
         moment_carried -= _cross(frames.origin[..., 1:, :], force_carried)
+        if self._sliding:
+            moment_carried = np.where(self._slides[:, None], force_carried, moment_carried)
         torque = np.einsum("...ji,...ji->...j", frames.axis, moment_carried) @ self._transmission
         return np.concatenate([force.sum(axis=-2), moment.sum(axis=-2), torque + self._armature * qdd], axis=-1)
 
@@ -142,6 +153,14 @@ class RigidBodyTree:
         """Return the force and moment on an upright base, (..., 6): the first components of `inverse_dynamics`."""
         force, moment = self._wrenches(self.frames(q), qd, qdd, base_velocity, base_acceleration)
         return np.concatenate([force.sum(axis=-2), moment.sum(axis=-2)], axis=-1)
+
+    def joint_mass_matrix(self, q: Array) -> Array:
+        """Return M(q) of the joints (..., n, n) where the base is fixed."""
+        return self.mass_matrix(q)[..., 6:, 6:]
+
+    def joint_torques(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """Return M(q) qdd + h(q, qd) (..., n) where the base is fixed."""
+        return self.inverse_dynamics(q, qd, qdd)[..., 6:]
 
     def jacobian(self, link: str, q: Array, rot_base_to_world: Array | None = None) -> Array:
         """Return J (..., 6, 6 + n) of the velocity [linear; angular] of the origin of `link`."""
@@ -187,9 +206,13 @@ class RigidBodyTree:
         linear[..., :3] = angular[..., 3:6] = np.eye(3)
         linear[..., 3:6] = -_skew(point)
         arm = point[..., :, None, :] - frames.origin[..., None, 1:, :]  # (..., b, j, 3)
+        axis = frames.axis[..., None, :, :] * supports[..., None]
         moved = _cross(frames.axis[..., None, :, :], arm) * supports[..., None]
+        if self._sliding:
+            slides = self._slides[:, None]
+            moved, axis = np.where(slides, axis, moved), np.where(slides, 0.0, axis)
         linear[..., 6:] = np.swapaxes(moved, -1, -2)
-        angular[..., 6:] = np.swapaxes(frames.axis[..., None, :, :] * supports[..., None], -1, -2)
+        angular[..., 6:] = np.swapaxes(axis, -1, -2)
         return linear, angular
 
     def _wrenches(
@@ -220,9 +243,13 @@ class RigidBodyTree:
             parent, spin = self._parent[b], frames.axis[..., b - 1, :] * rate[..., b - 1, None]
             w, dw = omega[..., parent, :], alpha[..., parent, :]
             arm = frames.origin[..., b, :] - frames.origin[..., parent, :]
+            accel[..., b, :] = accel[..., parent, :] + _cross(dw, arm) + _cross(w, _cross(w, arm))
+            if self._slides[b - 1]:
+                omega[..., b, :], alpha[..., b, :] = w, dw
+                accel[..., b, :] += frames.axis[..., b - 1, :] * rate_dot[..., b - 1, None] + 2.0 * _cross(w, spin)
+                continue
             omega[..., b, :] = w + spin
             alpha[..., b, :] = dw + frames.axis[..., b - 1, :] * rate_dot[..., b - 1, None] + _cross(w, spin)
-            accel[..., b, :] = accel[..., parent, :] + _cross(dw, arm) + _cross(w, _cross(w, arm))
         return omega, alpha, accel
 
 

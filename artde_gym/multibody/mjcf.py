@@ -15,7 +15,7 @@ from artde_gym.multibody.urdf import numbers
 
 GROUND = "ground"
 PAYLOAD = "payload"
-"""A massless body fixed to the base, to which an engine can assign the payload's mass and position."""
+"""A massless body fixed to the payload's link, to which an engine can assign the payload's mass and position."""
 CONTACT_TIME = 0.005  # s; about as stiff as Bullet's contacts, which correct a fifth of the depth each millisecond
 IMPEDANCE = (0.9, 0.95, 0.001)
 ARENA_MEMORY = "1M"
@@ -32,7 +32,7 @@ _SUN = {
 
 
 def mjcf(spec: RobotSpec) -> str:
-    """Return the robot as MJCF with a free base; joints and bodies have the names of the links."""
+    """Return the robot as MJCF with a free or fixed base; joints and bodies have the names of the links."""
     root = ET.Element("mujoco", model=spec.name)
     ET.SubElement(root, "compiler", angle="radian", inertiafromgeom="false", alignfree="false")
     # dense, as `auto` chooses at this size too: MuJoCo 4.0.0 factorizes sparse Hessians wrongly (its issue 3767)
@@ -54,8 +54,8 @@ def mjcf(spec: RobotSpec) -> str:
     bodies: dict[str | None, ET.Element] = {None: world}
     armature = dict(zip(spec.actuated, spec.armature, strict=True))
     for link in spec.links:
-        bodies[link.name] = _body(bodies[link.parent], link, armature.get(link.name, 0.0))
-    ET.SubElement(bodies[spec.base.name], "body", name=PAYLOAD)
+        bodies[link.name] = _body(bodies[link.parent], link, armature.get(link.name, 0.0), fixed=spec.fixed)
+    ET.SubElement(bodies[spec.payload_link], "body", name=PAYLOAD)
     for name, link, point in spec.sites:
         ET.SubElement(bodies[link], "site", name=name, pos=numbers(point), group="3")
 
@@ -84,18 +84,33 @@ def _light(root: ET.Element) -> None:
     ET.SubElement(visual, "map", znear="0.02")
 
 
-def _body(parent: ET.Element, link: Link, armature: float) -> ET.Element:
+def _body(parent: ET.Element, link: Link, armature: float, *, fixed: bool) -> ET.Element:
     body = ET.SubElement(parent, "body", name=link.name, pos=numbers(link.origin))
+    if link.rotation is not None:
+        x, y, _ = zip(*link.rotation, strict=True)
+        body.set("xyaxes", numbers((*x, *y)))
     if link.parent is None:
-        ET.SubElement(body, "freejoint")
+        if not fixed:
+            ET.SubElement(body, "freejoint")
     elif link.axis is not None:
-        ET.SubElement(body, "joint", name=link.name, axis=numbers(link.axis), armature=numbers([armature]))
-    ET.SubElement(body, "inertial", pos=numbers(link.com), mass=numbers([link.mass]), diaginertia=numbers(link.inertia))
+        sliding = {"type": "slide"} if link.prismatic else {}
+        joint = {"name": link.name, "axis": numbers(link.axis), "armature": numbers([armature])}
+        ET.SubElement(body, "joint", joint | sliding)
+    if link.mass > 0:
+        body.append(_inertial(link))
     for box in link.visuals:
         body.append(_shape(box, rgba=numbers(box.color)))
     for index, box in enumerate(link.collisions):
         body.append(_shape(box, name=_collision(link, index), group="3"))  # the renderer shows groups 0 to 2
     return body
+
+
+def _inertial(link: Link) -> ET.Element:
+    """Return mass and inertia, as principal moments where the tensor is diagonal."""
+    inertia = {"diaginertia": numbers(link.inertia)}
+    if any(link.products):
+        inertia = {"fullinertia": numbers((*link.inertia, *link.products))}
+    return ET.Element("inertial", {"pos": numbers(link.com), "mass": numbers([link.mass])} | inertia)
 
 
 def _shape(box: Box, **attributes: str) -> ET.Element:

@@ -23,10 +23,12 @@ from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
 from artde_gym.errors import RobotError
+from artde_gym.multibody.mjcf import PAYLOAD
 from artde_gym.multibody.spec import RobotSpec, Vector
 from artde_gym.multibody.urdf import urdf
+from artde_gym.sim.bullet_payload import MASSLESS, Carried, Fall
 from artde_gym.sim.camera import FIELD_OF_VIEW, NEAR, Camera
-from artde_gym.sim.engine import PAYLOAD_COLOR, PAYLOAD_LOOK, PAYLOAD_RADIUS, State
+from artde_gym.sim.engine import AT_ORIGIN, PAYLOAD_COLOR, PAYLOAD_LOOK, PAYLOAD_RADIUS, State
 from artde_gym.sim.ground import SUN, Shadow, paint
 from artde_gym.sim.pybullet_module import bullet
 from artde_gym.sim.rotation import Quaternion, point_velocity, rotate
@@ -76,6 +78,7 @@ class BulletEngine:
             physicsClientId=self._client,
         )
         self._ground = self._build_ground()
+        self._carried = Carried(spec) if spec.fixed else None
         self._robot = self._build_robot()
         self._ball = bullet.createVisualShape(  # shape of the payload, made once: Bullet never frees a visual shape
             bullet.GEOM_MESH,
@@ -93,6 +96,7 @@ class BulletEngine:
         self._friction = math.nan
         self._gravity: Vector = (0.0, 0.0, -9.81)
         self._snapshots: list[_Snapshot] = []
+        self._steps = 0  # since the beginning
         self._ballast: tuple[float, Vector] = (0.0, _ORIGIN)  # mass and position of the payload
         self._payload: int | None = None  # body
         self._holder: int | None = None  # constraint
@@ -109,11 +113,11 @@ class BulletEngine:
         client: dict[str, Any] = {"physicsClientId": self._client}
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / f"{self.spec.name}.urdf"
-            file.write_text(urdf(self.spec), encoding="utf-8")
+            file.write_text(urdf(self.spec if self._carried is None else self._carried.spec()), encoding="utf-8")
             flags = bullet.URDF_USE_INERTIA_FROM_FILE
             if self.spec.feet_collide:
                 flags |= bullet.URDF_USE_SELF_COLLISION  # only feet have a collision shape
-            robot = bullet.loadURDF(str(file), flags=flags, **client)
+            robot = bullet.loadURDF(str(file), useFixedBase=self.spec.fixed, flags=flags, **client)
         count = bullet.getNumJoints(robot, **client)
         self._links = {bullet.getJointInfo(robot, i, **client)[12].decode(): i for i in range(count)}
         self._links[self.spec.base.name] = -1
@@ -135,26 +139,38 @@ class BulletEngine:
                 **client,
             )
             bullet.changeDynamics(robot, link, activationState=bullet.ACTIVATION_STATE_DISABLE_SLEEPING, **client)
+        # where there are products, Bullet's frame of a link has the principal axes
+        self._moments = {
+            link.name: bullet.getDynamicsInfo(robot, self._links[link.name], **client)[2]
+            if any(link.products)
+            else link.inertia
+            for link in self.spec.links
+        }
         for joint in range(count):
             bullet.setJointMotorControl2(robot, joint, bullet.VELOCITY_CONTROL, force=0.0, **client)
         for joint in self._held:
             bullet.setJointMotorControl2(
                 robot, joint, bullet.POSITION_CONTROL, targetPosition=0.0, force=HOLD_TORQUE, **client
             )
+        self._gears: list[int] = []
         for gear in self.spec.gears:
             rotor, driven = self._links[gear.rotor], self._links[gear.driven]
             constraint = bullet.createConstraint(
                 robot, rotor, robot, driven, bullet.JOINT_GEAR, [0, 0, 1], [0, 0, 0], [0, 0, 0], **client
             )
             bullet.changeConstraint(constraint, gearRatio=-gear.ratio, maxForce=GEAR_FORCE, erp=0.0, **client)
+            self._gears.append(constraint)
+        if self._carried is not None:
+            self._fresh = bullet.saveState(**client)
         return robot
 
     def reset(self, position: Vector, q: Array) -> None:
         self._remove_payload()
-        center = np.add(position, self._com).tolist()
         client: dict[str, Any] = {"physicsClientId": self._client}
-        bullet.resetBasePositionAndOrientation(self._robot, center, [0.0, 0.0, 0.0, 1.0], **client)
-        bullet.resetBaseVelocity(self._robot, [0.0] * 3, [0.0] * 3, **client)
+        if self._carried is None:
+            center = np.add(position, self._com).tolist()
+            bullet.resetBasePositionAndOrientation(self._robot, center, [0.0, 0.0, 0.0, 1.0], **client)
+            bullet.resetBaseVelocity(self._robot, [0.0] * 3, [0.0] * 3, **client)
         angle = dict(zip(self.spec.actuated, q.tolist(), strict=True))
         angle.update({gear.rotor: gear.ratio * angle[gear.driven] for gear in self.spec.gears})
         for name, joint in self._links.items():
@@ -175,12 +191,15 @@ class BulletEngine:
     def __getstate__(self) -> dict[str, Any]:
         """Return the state of a copy: a world in its own client that steps bitwise like this one."""
         payload = None if self._payload is None else (*self._ballast, self._holder is not None)
+        if self._carried is not None:
+            payload = self._carried.kept()
         return {
             "built": (self.spec, self.time_step),
             "snapshots": [(saved.friction, saved.world) for saved in self._snapshots],
             "set": (self._gravity, self._scales, self._contact_time, self._friction),
             "payload": payload,
             "world": self._world(),
+            "steps": self._steps,
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -192,12 +211,15 @@ class BulletEngine:
         self.set_gravity(gravity)
         self.scale_masses(*scales)
         self.set_contact_time(contact_time)
-        if state["payload"] is not None:
+        if self._carried is not None:
+            self._carry(*state["payload"])
+        elif state["payload"] is not None:
             mass, position, held = state["payload"]
             self.attach_payload(mass, position)
             if not held:
                 self.release_payload()
         self._load(friction, state["world"])
+        self._steps = state["steps"]
 
     def _world(self) -> bytes:
         """Return positions, velocities and contacts of all bodies in Bullet's file format."""
@@ -224,6 +246,8 @@ class BulletEngine:
         states = bullet.getJointStates(self._robot, self._joints, physicsClientId=client) if self._joints else ()
         n = len(states)
         joints = np.array([state[0] for state in states] + [state[1] for state in states])  # one array is faster
+        if self._carried is not None:
+            return State(joints[:n], joints[n:], *AT_ORIGIN)
         x, y, z = arm = rotate(self._to_origin, quat)
         position = (center[0] + x, center[1] + y, center[2] + z)
         return State(joints[:n], joints[n:], position, quat, point_velocity(velocity, spin, arm), spin)
@@ -234,6 +258,7 @@ class BulletEngine:
                 self._robot, self._joints, bullet.TORQUE_CONTROL, forces=tau.tolist(), physicsClientId=self._client
             )
         bullet.stepSimulation(physicsClientId=self._client)
+        self._steps += 1
 
     def apply_base_wrench(self, force: Vector, torque: Vector) -> None:
         client = self._client  # the origin of Bullet's base frame is the base's center of mass
@@ -308,7 +333,7 @@ class BulletEngine:
                 self._robot,
                 self._links[link.name],
                 mass=own * link.mass,
-                localInertiaDiagonal=[turning * moment for moment in link.inertia],  # otherwise Bullet computes its own
+                localInertiaDiagonal=[turning * moment for moment in self._moments[link.name]],  # else Bullet's own
                 physicsClientId=self._client,
             )
         self._scales = scales
@@ -332,6 +357,9 @@ class BulletEngine:
         self._friction = coefficient
 
     def attach_payload(self, mass: float, position: Vector) -> None:
+        if self._carried is not None:
+            self._carry(mass, position, None)
+            return
         self._remove_payload()
         client: dict[str, Any] = {"physicsClientId": self._client}
         center, quat = bullet.getBasePositionAndOrientation(self._robot, **client)
@@ -353,17 +381,60 @@ class BulletEngine:
         bullet.resetBaseVelocity(body, velocity.tolist(), spin, **client)
         self._payload, self._holder, self._ballast = body, joint, (mass, position)
 
+    def _carry(self, mass: float, position: Vector, fall: Fall | None) -> None:
+        """Set the payload of a fixed robot, which is a link: elsewhere it is another link."""
+        carried = self._carried
+        if carried is None:
+            return
+        states = {name: bullet.getJointState(self._robot, joint, physicsClientId=self._client)[:2]
+                  for name, joint in self._links.items() if joint >= 0}  # fmt: skip
+        if position != carried.position:
+            for gear in self._gears:
+                bullet.removeConstraint(gear, physicsClientId=self._client)
+            bullet.removeState(self._fresh, physicsClientId=self._client)
+            bullet.removeBody(self._robot, physicsClientId=self._client)
+            carried.position = position
+            self._robot = self._build_robot()
+            scales, self._scales = self._scales, (1.0, {}, 1.0)
+            self.scale_masses(*scales)
+        bullet.restoreState(self._fresh, physicsClientId=self._client)  # also without a rebuild: no solver's memory
+        for name, (angle, rate) in states.items():
+            bullet.resetJointState(self._robot, self._links[name], angle, rate, physicsClientId=self._client)
+        carried.mass, carried.fall = mass, fall
+        heavy = {"mass": max(mass, MASSLESS), "localInertiaDiagonal": [carried.moment] * 3}
+        bullet.changeDynamics(self._robot, self._links[PAYLOAD], **heavy, physicsClientId=self._client)
+
+    def _release(self, carried: Carried) -> None:
+        """Let the payload of a fixed robot fall."""
+        link = self._links[PAYLOAD]
+        state = bullet.getLinkState(self._robot, link, 1, 1, physicsClientId=self._client)
+        self._carry(0.0, carried.position, Fall(state[0], state[6], self._steps * self.time_step))
+
     def release_payload(self) -> None:
+        if self._carried is not None:
+            if self._carried.mass > 0:
+                self._release(self._carried)
+            return
         if self._holder is not None:
             bullet.removeConstraint(self._holder, physicsClientId=self._client)
             self._holder = None
 
     def payload_position(self) -> Vector | None:
+        if self._carried is not None:
+            if self._carried.mass > 0:
+                link = self._links[PAYLOAD]
+                return bullet.getLinkState(self._robot, link, computeForwardKinematics=1, physicsClientId=self._client)[
+                    0
+                ]
+            return self._carried.fallen(self._steps * self.time_step, self._gravity)
         if self._payload is None:
             return None
         return bullet.getBasePositionAndOrientation(self._payload, physicsClientId=self._client)[0]
 
     def _remove_payload(self) -> None:
+        if self._carried is not None:
+            self._carry(0.0, self._carried.home, None)
+            return
         self.release_payload()
         if self._payload is not None:
             bullet.removeBody(self._payload, physicsClientId=self._client)

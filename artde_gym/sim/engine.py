@@ -29,6 +29,8 @@ class State(NamedTuple):
     angular_velocity: Vector
 
 
+AT_ORIGIN = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+"""Position, attitude and velocities of a fixed base."""
 PAYLOAD_RADIUS = 0.08  # m, of the payload, a homogeneous ball
 PAYLOAD_LOOK = 0.09  # m, its radius in rendered images, so that it is visible on either side of Ojas' torso
 PAYLOAD_COLOR = (0.85, 0.45, 0.1, 1.0)
@@ -92,10 +94,10 @@ class World(Protocol):
         ...
 
     def attach_payload(self, mass: float, position: Vector) -> None:
-        """Fix a ball of `mass` (kg) and `PAYLOAD_RADIUS` to the base link, its center at `position` in its frame (m).
+        """Fix a ball of `mass` (kg) and `PAYLOAD_RADIUS` to a link, its center at `position` in its frame (m).
 
-        It has the base's velocity, collides with nothing, and falls freely, even through the ground, once released.
-        It replaces a previous payload.
+        The link is the base or the spec's `carrier`. The ball has its velocity, collides with nothing, and falls
+        freely, even through the ground, once released. It replaces a previous payload.
         """
         ...
 
@@ -121,6 +123,8 @@ class Engine(World, Protocol):
 
     def reset(self, position: Vector, q: Array) -> None:
         """Put the upright robot with its base origin at `position` (m) and the joints at `q`, all at rest.
+
+        A fixed base stays at the origin.
 
         A payload is removed. Contact forces begin with the next step.
         """

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from artde_gym.arrays import Array
 from artde_gym.multibody.spec import RobotSpec, Vector
 from artde_gym.sim.camera import Camera
-from artde_gym.sim.engine import State
+from artde_gym.sim.engine import AT_ORIGIN, State
 from artde_gym.sim.ground import Shadow, paint
 from artde_gym.sim.mujoco_canvas import Canvas
 from artde_gym.sim.mujoco_world import STATE, Blueprint, Fields, MujocoWorld
@@ -54,11 +54,13 @@ class MujocoEngine(MujocoWorld):
         fields += (model.pair_solref,)
         super().__init__(blueprint, Fields(*fields, model.opt.gravity, data.xfrc_applied))
         # views into MuJoCo's memory
-        self._q = data.qpos[7:]
-        self._qd = data.qvel[6:]
-        self._torque = data.qfrc_applied[6:]
+        base_q, base_v = blueprint.base_q, blueprint.base_v
+        self._q = data.qpos[base_q:]
+        self._qd = data.qvel[base_v:]
+        self._torque = data.qfrc_applied[base_v:]
         self._joints = blueprint.joints
-        self._pose, self._twist = data.qpos[:7], data.qvel[:6]
+        self._fixed = spec.fixed
+        self._pose, self._twist = data.qpos[:base_q], data.qvel[:base_v]
         self._pushes, self._pushed = data.xfrc_applied, False
         self._forces = data.sensordata
         self._fall: _Fall | None = None
@@ -70,7 +72,8 @@ class MujocoEngine(MujocoWorld):
     def reset(self, position: Vector, q: Array) -> None:
         self._remove_payload()
         mj.mj_resetData(self._model, self._data)
-        self._pose[:] = (*position, 1.0, 0.0, 0.0, 0.0)
+        if not self._fixed:
+            self._pose[:] = (*position, 1.0, 0.0, 0.0, 0.0)
         self._q[self._joints] = q
 
     def save_state(self) -> int:
@@ -108,6 +111,8 @@ class MujocoEngine(MujocoWorld):
         return state
 
     def state(self) -> State:
+        if self._fixed:
+            return State(self._q[self._joints].copy(), self._qd[self._joints].copy(), *AT_ORIGIN)
         x, y, z, w, i, j, k = self._pose.tolist()
         vx, vy, vz, wx, wy, wz = self._twist.tolist()
         quat = (i, j, k, w)
@@ -144,11 +149,20 @@ class MujocoEngine(MujocoWorld):
         super().attach_payload(mass, position)
 
     def release_payload(self) -> None:
-        if self.held is not None:
+        if self.held is not None and self.spec.carrier:
+            self._fall = _Fall(*self._carried(), self._data.time)
+        elif self.held is not None:
             _, _, position, quat, velocity, spin = self.state()
             arm = rotate(self.held, quat)
             self._fall = _Fall(np.add(position, arm), np.array(point_velocity(velocity, spin, arm)), self._data.time)
         super().release_payload()
+
+    def _carried(self) -> tuple[Array, Array]:
+        """Return position and velocity of a payload on a link of the spec's choice."""
+        data, jacobian = self.placed(), np.zeros((3, self._model.nv))
+        mj.mj_comPos(self._model, data)
+        mj.mj_jacBody(self._model, data, jacobian, None, self._blueprint.payload)
+        return data.xpos[self._blueprint.payload].copy(), jacobian @ data.qvel
 
     def masses_changed(self) -> None:
         mj.mj_setConst(self._model, self._scratch)
@@ -158,6 +172,9 @@ class MujocoEngine(MujocoWorld):
         self._fall = None
 
     def payload_position(self) -> Vector | None:
+        if self.held is not None and self.spec.carrier:
+            x, y, z = self.placed().xpos[self._blueprint.payload].tolist()
+            return x, y, z
         if self.held is not None:
             state = self.state()
             (x, y, z), (ax, ay, az) = state.position, rotate(self.held, state.quat_xyzw)
@@ -184,5 +201,7 @@ class MujocoEngine(MujocoWorld):
             self._canvas = None
 
     def _quat(self) -> Quaternion:
+        if self._fixed:
+            return AT_ORIGIN[1]
         w, x, y, z = self._pose[3:].tolist()
         return x, y, z, w

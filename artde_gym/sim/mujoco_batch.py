@@ -57,7 +57,9 @@ class MujocoBatch:
         joints = blueprint.joints
         if not isinstance(joints, slice):
             raise RobotError("actuated joints", spec.actuated, "consecutive joints of the tree")
-        self._angles, self._speeds = slice(7 + joints.start, 7 + joints.stop), slice(6 + joints.start, 6 + joints.stop)
+        base_q, base_v = blueprint.base_q, blueprint.base_v
+        self._angles = slice(base_q + joints.start, base_q + joints.stop)
+        self._speeds = slice(base_v + joints.start, base_v + joints.stop)
         self._batch = batch = Batch(blueprint.model, n, threads)
         self._pose, self._twist, self._torque = (batch.bind(name) for name in ("qpos", "qvel", "qfrc_applied"))
         self._sensors = batch.bind("sensordata")
@@ -93,7 +95,8 @@ class MujocoBatch:
         """Put the upright robot of a world at `position` (m) with joints at `q`, all at rest, without a payload."""
         self.worlds[world].release_payload()
         self._batch.reset(np.array([world]), stage=mj.mjtStage.mjSTAGE_NONE)
-        self._pose[world, :7] = (*position, 1.0, 0.0, 0.0, 0.0)
+        if not self._blueprint.spec.fixed:
+            self._pose[world, :7] = (*position, 1.0, 0.0, 0.0, 0.0)
         self._pose[world, self._angles] = q
 
     def save_state(self, world: int) -> int:
@@ -111,6 +114,10 @@ class MujocoBatch:
 
     def state(self) -> States:
         """Return the current states; where possible views, which the next step changes."""
+        if self._blueprint.spec.fixed:
+            zero, one = np.zeros(len(self._pose)), np.ones(len(self._pose))
+            nothing = (zero, zero, zero)
+            return States(*self.joints(), nothing, (*nothing, one), nothing, nothing)
         x, y, z, w, i, j, k = self._pose[:, :7].T
         vx, vy, vz, wx, wy, wz = self._twist[:, :6].T
         quat = (i, j, k, w)

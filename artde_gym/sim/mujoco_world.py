@@ -47,8 +47,9 @@ class Blueprint:
         self.feet = [model.body(name).id for name in spec.feet]
         self.payload = model.body(PAYLOAD).id
         self.sites = {name: model.site(name).id for name, _, _ in spec.sites}
-        # MuJoCo orders coordinates as the base's, then the joints' in the order of the tree
-        self.joints = _span([model.joint(name).dofadr[0] - 6 for name in spec.actuated])
+        # MuJoCo orders coordinates as those of a free base, then the joints' in the order of the tree
+        self.base_q, self.base_v = (0, 0) if spec.fixed else (7, 6)
+        self.joints = _span([model.joint(name).dofadr[0] - self.base_v for name in spec.actuated])
         self.mass, self.inertia = model.body_mass.copy(), model.body_inertia.copy()
         self.armature = model.dof_armature.copy()
 

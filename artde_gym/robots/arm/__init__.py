@@ -1,0 +1,1 @@
+"""Manipulators: the built-in Panda, and any arm from a URDF or MJCF file."""
