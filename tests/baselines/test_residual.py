@@ -35,7 +35,7 @@ ENVIRONMENTS = {
 SLOW = {"computed-torque"}
 LAWS = list(registered_controllers())
 SLUNG = {"geometric-load", "tde+swing", "atde+swing", "artde+swing"}
-QUADROTOR_ONLY = {"asmc", "indi", "geometric", *SLUNG}
+QUADROTOR_ONLY = {"asmc", "indi", "geometric", "tde-tight", *SLUNG}
 BIPED_ONLY = {"computed-torque", "tde+balance", "tde-stiff"}
 CASES = [
     (env_id, base)
