@@ -21,6 +21,7 @@ import pandas as pd
 import controllers
 from artde_gym.evaluation import statistics
 from artde_gym.evaluation.seeds import episode_seed
+from artde_gym.evaluation.side_by_side import SideBySide
 from artde_gym.evaluation.vector_rollout import run_vector
 from artde_gym.robots.q450.kit import kick
 from artde_gym.scenarios import SCENARIOS
@@ -55,37 +56,6 @@ COLUMNS = {
 SETTLED = "recovery_time_s_push0_swing"
 
 
-class Grid:
-    """A vector environment whose parts have disturbances of their own.
-
-    Args:
-        parts: (disturbances, number of environments) each.
-    """
-
-    def __init__(self, parts: Sequence[tuple[Mapping[str, Any], int]]) -> None:
-        self._parts, self.num_envs = parts, sum(count for _, count in parts)
-        made = gym.make_vec(
-            "QuadSling-Payload-v0", self.num_envs, "vector_entry_point", engine="numpy", duration=45.0,
-            disturbances={}, autoreset_mode="Disabled",
-        )  # fmt: skip
-        self.unwrapped: Any = made.unwrapped
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.unwrapped, name)
-
-    def reset(self, *, seed: Sequence[int]) -> tuple[Any, Any]:
-        """Start all flights, part by part."""
-        found = self.unwrapped.reset(seed=list(seed))
-        first = 0
-        for disturbances, count in self._parts:
-            mask = np.zeros(self.num_envs, np.bool_)
-            mask[first : first + count] = True
-            options = {"disturbances": disturbances, "reset_mask": mask}
-            found = self.unwrapped.reset(seed=list(seed), options=options)
-            first += count
-        return found
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("figure", choices=FIGURES)
@@ -107,36 +77,26 @@ def flights(
     labels: Sequence[str], cells: Sequence[tuple[float, float]], seeds: int, seed: int, more: Mapping[str, Any]
 ) -> pd.DataFrame:
     """One row a flight: law by law, mass and cable by mass and cable, all in one vector."""
-    env = Grid([({**scenario(mass, cable), **more}, seeds) for _ in labels for mass, cable in cells])
+    disturbances = [{**scenario(mass, cable), **more} for mass, cable in cells for _ in range(seeds)] * len(labels)
+    made = gym.make_vec(
+        "QuadSling-Payload-v0", len(disturbances), "vector_entry_point", engine="numpy", duration=45.0,
+        disturbances={}, autoreset_mode="Disabled",
+    )  # fmt: skip
+    env: Any = made.unwrapped
+    policies = [policy for label in labels for mass, _ in cells for policy in [policy_of(label, env, mass)] * seeds]
+    kinds = [label for label in labels for _ in range(len(cells) * seeds)]
     numbers = [episode_seed(seed, number) for number in range(seeds)] * (len(cells) * len(labels))
-    policies: list[tuple[Any, int]] = []
-    for label in labels:
-        name, gains = LAWS[label]
-        if name == "geometric-load":
-            policies += [(controllers.make(name, env.unwrapped, load_mass_p=mass, **gains), seeds) for mass, _ in cells]
-        else:
-            policies.append((controllers.make(name, env.unwrapped, **gains), seeds * len(cells)))
-    return pd.DataFrame([episode.row for episode in run_vector(env, Together(policies), numbers)])
+    options = {"disturbances": disturbances}
+    return pd.DataFrame(
+        [episode.row for episode in run_vector(env, SideBySide(policies, kinds), numbers, options=options)]
+    )
 
 
-class Together:
-    """Policies side by side, each for so many environments of a vector."""
-
-    def __init__(self, policies: Sequence[tuple[Any, int]]) -> None:
-        stops = np.cumsum([count for _, count in policies]).tolist()
-        self._parts = [
-            (policy, slice(stop - count, stop)) for (policy, count), stop in zip(policies, stops, strict=True)
-        ]
-
-    def predict(
-        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
-    ) -> tuple[Any, Any]:
-        states = [None] * len(self._parts) if state is None else state
-        found = [
-            policy.predict(observation[part], own, None if own is None else episode_start[part])
-            for (policy, part), own in zip(self._parts, states, strict=True)
-        ]
-        return np.concatenate([action for action, _ in found]), [own for _, own in found]
+def policy_of(label: str, env: Any, mass: float) -> Any:
+    """Build the policy of a law; one that takes the load's mass is told it."""
+    name, gains = LAWS[label]
+    told = {"load_mass_p": mass} if name == "geometric-load" else {}
+    return controllers.make(name, env, **gains, **told)
 
 
 def scenario(mass: float, cable: float) -> dict[str, Any]:

@@ -72,6 +72,16 @@ def with_engine(env_id: str, kwargs: Mapping[str, Any], vectorized: bool = False
     return {**kwargs, "engine": getattr(creator, "own_engine", None) if given is None else given}
 
 
+def single_arguments(env_id: str, kwargs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the arguments of a vector, or of a single environment, as single ones take them."""
+    known = arguments_of(env_id)
+    kwargs = {name: value for name, value in kwargs.items() if name in known}  # a vector takes others, too
+    try:
+        return with_engine(env_id, kwargs)
+    except OptionError:  # the vector's own physics
+        return {name: value for name, value in kwargs.items() if name != "engine"}
+
+
 def fastest_engine(env_id: str, engine: str | None = None) -> tuple[bool, str]:
     """Tell whether an environment is faster `vectorized` in one engine, or in any; returns the engine, too.
 

@@ -11,7 +11,7 @@ from artde_gym.arguments import check_integer, wrap_read_errors
 from artde_gym.deprecation import current_configuration
 from artde_gym.errors import OptionError, StoreError, UnknownNameError, suggest_names
 from artde_gym.evaluation.cells import Cell
-from artde_gym.evaluation.environments import arguments_of, metrics_spec_of, robot_of, with_engine
+from artde_gym.evaluation.environments import metrics_spec_of, robot_of, single_arguments
 from artde_gym.evaluation.plan import Plan
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.evaluation.seeds import episode_seed
@@ -187,12 +187,7 @@ class _Archive:
         if scenario not in self.scenarios:
             raise UnknownNameError("scenario", scenario, suggest_names(scenario, self.scenarios))
         cell = self._cells[scenario]
-        known = arguments_of(cell.env_id)
-        kwargs = {name: value for name, value in cell.kwargs.items() if name in known}  # a vector takes others, too
-        try:
-            return cell._replace(kwargs=with_engine(cell.env_id, kwargs))
-        except OptionError:  # the vector's own physics
-            return cell._replace(kwargs={name: value for name, value in kwargs.items() if name != "engine"})
+        return cell._replace(kwargs=single_arguments(cell.env_id, cell.kwargs))
 
     def takes(
         self, scenario: str, controllers: Sequence[str] | None, episode: int | None, on_progress: Progress | None

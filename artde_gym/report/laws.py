@@ -13,7 +13,7 @@ from scipy.linalg import eigh
 
 from artde_gym.arrays import Array
 from artde_gym.evaluation.console import REFERENCE
-from artde_gym.evaluation.environments import single
+from artde_gym.evaluation.environments import single, single_arguments
 from artde_gym.multibody.dynamics import RigidBodyTree, joint_space_inertia
 from artde_gym.multibody.spec import RobotSpec
 from artde_gym.palette import OTHERS
@@ -130,7 +130,7 @@ class Laws:
 
     def _environment(self, scenario: str) -> Any:
         cell = self._run.cell(scenario)
-        return single(cell["env_id"], json.dumps(cell["kwargs"]))
+        return single(cell["env_id"], json.dumps(single_arguments(cell["env_id"], cell["kwargs"])))
 
 
 def inertia_of(robot: Any) -> Callable[[Array], Array] | None:

@@ -109,7 +109,7 @@ def _scenario(run: Run, laws: Laws, album: SnapshotSet, scenario: str, said: lis
     parts += replay_of(run, scenario)
     parts += album.figures(scenario)
     parts += tables.metrics(run, scenario)
-    parts.append(tables.events(run, scenario))
+    parts += [tables.watched(run, scenario), tables.events(run, scenario)]
     episode = run.episode(scenario)
     if episode is None:
         parts.append(paragraph("No signals were stored for this scenario, so there are no plots over time.", "soft"))

@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd
 
 from artde_gym.evaluation import statistics, thesis
-from artde_gym.evaluation.console import ALL, REFERENCE, UNITS, digits_of, measured, share_text, time_text
+from artde_gym.evaluation.console import ALL, DIGITS, REFERENCE, UNITS, digits_of, measured, share_text, time_text
+from artde_gym.evaluation.result import RECOVERY
 from artde_gym.evaluation.statistics import Estimate
 from artde_gym.palette import styles
 from artde_gym.report.chart import Axis, Chart
@@ -46,7 +47,7 @@ def falls(run: Run, scenario: str) -> str:
             thesis.ending(reference, name),
         ])  # fmt: skip
     columns = ["controller", "falls", "rate (95 % interval)", "time to fall (s)", "thesis"]
-    return table(f"{scenario}: episodes that ended in a fall", columns, rows)
+    return table(f"{scenario}: episodes that ended in a fall", *_without_empty(columns, rows))
 
 
 def survival(run: Run, scenario: str) -> str:
@@ -127,6 +128,35 @@ def events(run: Run, scenario: str) -> str:
     return table(f"{scenario}: after pushes and drops (95 % intervals)", columns, rows)
 
 
+def watched(run: Run, scenario: str) -> str:
+    """Return RMS and largest value of each watched signal, such as a swing, and how it settles after each push."""
+    result, rows = run.result, []
+    for signal in run.tracking(scenario).watched:
+        text, digits = UNITS.get(signal.unit, (signal.unit, DIGITS))
+        end = f"_{signal.name}"
+        pushes = [
+            column.removeprefix(RECOVERY).removesuffix(end)
+            for column in result.metrics
+            if column.startswith(RECOVERY) and column.endswith(end)
+        ]
+        for name in result.controllers:
+            means = [
+                statistics.mean(result.values(scenario, name, f"{kind}_{signal.name}_{signal.unit}"))
+                for kind in ("rms", "max")
+            ]
+            back = [(push, result.recovery(scenario, name, push + end)) for push in pushes]
+            rows.append([
+                f"{signal.name.replace('_', ' ')} ({text})",
+                name,
+                *(Cell(_text(mean, digits), mean.value if mean.n else None) for mean in means),
+                "; ".join(f"{push}: {share_text(one.share)}, {time_text(one.median.value)}" for push, one in back),
+            ])  # fmt: skip
+    if not rows:
+        return ""
+    columns = ["signal", "controller", "RMS", "largest", "settled after, median time (s)"]
+    return table(f"{scenario}: signals beside the errors, means with 95 % intervals", *_without_empty(columns, rows))
+
+
 def _table(run: Run, scenario: str, metric: str, title: str, axes: list[str]) -> str:
     result, reference = run.result, _reference(scenario)
     rivals = REFERENCE in result.controllers and len(result.controllers) > 1
@@ -147,10 +177,20 @@ def _table(run: Run, scenario: str, metric: str, title: str, axes: list[str]) ->
                 row += _against(run, scenario, column, name)
                 row.append(_printed_change(reference, metric, axis, name))
             rows.append(row)
-    columns = ["axis", "controller", "ours (95 % interval)", "thesis"]
+    columns = ["axis", "controller", "mean (95 % interval)", "thesis"]
     if rivals:
         columns += [f"{REFERENCE} against it (%)", f"{REFERENCE} smaller (% of seeds)", "same in the thesis (%)"]
-    return table(f"{scenario}: {title}", columns, rows)
+    return table(f"{scenario}: {title}", *_without_empty(columns, rows))
+
+
+def _without_empty(columns: list[str], rows: list[list[str | Cell]]) -> tuple[list[str], list[list[str | Cell]]]:
+    """Leave out columns without any value, such as those of the thesis where it has published none."""
+    kept = [i for i in range(len(columns)) if not rows or any(_written(row[i]) for row in rows)]
+    return [columns[i] for i in kept], [[row[i] for i in kept] for row in rows]
+
+
+def _written(cell: str | Cell) -> str:
+    return cell.text if isinstance(cell, Cell) else cell
 
 
 def _against(run: Run, scenario: str, column: str, rival: str) -> list[str | Cell]:

@@ -340,7 +340,7 @@ def test_batch_is_loop_to_the_bit(kwargs: dict[str, Any]) -> None:
         ({"payload": {"mass": 0.3, "cable": float("nan")}}, "payload.cable", "0 to 2 m"),
         ({"payload": {"mass": 0.3, "cable": "long"}}, "payload.cable", "0 to 2 m"),
         ({"cable": 0.5}, "cable", "payload"),
-        ({"push": {"body": "payload", "magnitude": 1.0, "start": 0.0}}, "push.body", "there is no payload"),
+        ({"push": {"body": "payload", "magnitude": 1.0, "start": 0.0}}, "push.body", "add a payload"),
     ],
 )
 def test_a_bad_cable_is_refused(given: dict[str, Any], field: str, allowed: str) -> None:

@@ -12,6 +12,7 @@ from rich.console import Console
 from artde_gym.errors import OptionError
 from artde_gym.evaluation import Result, statistics
 from artde_gym.evaluation.console import print_claims
+from artde_gym.registration import registered_controllers
 from artde_gym.robots.ojas.thesis import JOINTS
 from artde_gym.robots.q450.thesis import ATTITUDE, POSITION, REPORTED
 from artde_gym.scenarios import SCENARIOS
@@ -246,3 +247,25 @@ def test_claims_of_falls_and_of_settling() -> None:
     assert settles("Q-sling", time, {"c": True})(result).outcome == "not measured"  # nobody knows
     assert settles("Q-sling", "recovery", {"a": True})(result).outcome == "not measured"
     assert "a 20/20" in settles("Q-sling", time, {"a": True})(result).measured
+
+
+@pytest.mark.parametrize(
+    ("scenario", "words", "name"),
+    [
+        ("Q-sling", "tight tracking does not damp", "tde-tight"),
+        ("Q-sling-gale", "tight tracking does not damp", "tde-tight"),
+        ("Q-sling-late", "60 ms late breaks the swing term", "tde+swing"),
+    ],
+)
+def test_claims_about_the_sling(scenario: str, words: str, name: str) -> None:
+    (claim,) = [claim for claim in all_claims() if claim.scenario == scenario and words in claim.text]
+    assert name in registered_controllers()
+    for bad, outcome in ((True, "holds"), (False, "does not hold")):
+        settled = np.inf if bad else 2.0
+        rows = [
+            {"scenario": scenario, "controller": name, "episode": i, "seed": i,
+             "fell": bad and scenario == "Q-sling-late", "recovery_time_s_push0_swing": settled}
+            for i in range(20)
+        ]  # fmt: skip
+        assert claim.judge(Result(pd.DataFrame(rows))).outcome == outcome
+    assert claim.judge(episodes({"artde": 1.0}, scenario=scenario)).outcome == "not measured"

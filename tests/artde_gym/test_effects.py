@@ -141,7 +141,7 @@ def test_what_an_effect_gives_is_checked():
 
 
 def test_a_name_is_taken_once():
-    with pytest.raises(OptionError, match="not taken"):
+    with pytest.raises(OptionError, match="is taken"):
         register_disturbance(TETHER, tether)
     with pytest.raises(OptionError, match=r"a name that is not taken|any name except"):
         register_disturbance(DISTURBANCES["payload"], tether, replace=True)

@@ -66,5 +66,5 @@ def test_batches_are_of_engines_that_have_them() -> None:
 
 
 def test_a_name_is_taken_once() -> None:
-    with pytest.raises(OptionError, match="not taken"):
+    with pytest.raises(OptionError, match="is taken"):
         register_engine(EngineSpec("mujoco", "Another", "my_engine:MyEngine", "my-engine"))

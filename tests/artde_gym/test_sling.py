@@ -233,7 +233,7 @@ def test_a_swing_that_ends_before_it_settles_never_settled() -> None:
     assert never["recovery_time_s_push0_load_error"] == 0.0
 
 
-@pytest.mark.parametrize("name", ["Q-sling", "Q-sling-calm", "Q-sling-gale"])
+@pytest.mark.parametrize("name", ["Q-sling", "Q-sling-calm", "Q-sling-gale", "Q-sling-late"])
 def test_scenarios_fly(name: str) -> None:
     env = vector(2, duration=45.0)
     observations, _ = env.reset(seed=1, options={"scenario": name})

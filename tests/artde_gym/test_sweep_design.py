@@ -137,7 +137,7 @@ def test_whatever_decides_about_an_episode_decides_about_its_cell(name, value):
         ({"grid": {"gains.k_p": [1]}}, UnknownNameError, ["gains.k_p"]),
         ({"grid": {"disturbances.storm.scale": [1]}}, UnknownNameError, ["storm", "wind"]),
         ({"grid": {"disturbances.wind.skale": [1]}}, UnknownNameError, ["skale", "did you mean 'scale'"]),
-        ({"grid": {"disturbances.push.magnitude": [1]}}, OptionError, ["at least one 'push'"]),
+        ({"grid": {"disturbances.push.magnitude": [1]}}, OptionError, ["no 'push' to vary"]),
         ({"grid": {"seed": ["x"]}}, OptionError, ["seed", "'x'"]),
         ({"grid": {"controller": ["tde", {}]}}, OptionError, ["controller", "a name"]),
         ({"sample": {"draws": 1, "vary": {"controller": {"choice": [[]]}}}}, OptionError, ["controller", "a name"]),
@@ -150,7 +150,11 @@ def test_whatever_decides_about_an_episode_decides_about_its_cell(name, value):
         ({"sample": {"draws": 1, "vary": {"seed": {"log_uniform": [0, 1]}}}}, OptionError, ["above zero"]),
         ({"sample": {"draws": 1, "vary": {"seed": {"integers": [0, 1.5]}}}}, OptionError, ["whole"]),
         ({"sample": {"draws": 1, "vary": {"seed": {"choice": []}}}}, OptionError, ["at least one"]),
-        ({"grid": {"seed": [0]}, "sample": {"draws": 1, "vary": {"seed": {"choice": [1]}}}}, OptionError, ["either"]),
+        (
+            {"grid": {"seed": [0]}, "sample": {"draws": 1, "vary": {"seed": {"choice": [1]}}}},
+            OptionError,
+            ["in the grid and in the sample"],
+        ),
     ],
 )
 def test_what_is_wrong_is_named(change, error, words):

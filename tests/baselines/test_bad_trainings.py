@@ -44,7 +44,7 @@ def training(env: str = QUADROTOR, base: str = "tde", **more: Any) -> Training:
         ({"env_kwargs": {**SHORT, "engine": "mujoco"}}, "engine is 'mujoco'"),
         ({"env_kwargs": {**SHORT, "nope": 1}}, "argument of .* is 'nope'"),
         ({"env": BIPED, "env_kwargs": {**SHORT, "nope": 1}}, "argument of .* is 'nope'"),
-        ({"env_kwargs": {**SHORT, "disturbances": {}}}, "pass disturbances as `disturbances`"),
+        ({"env_kwargs": {**SHORT, "disturbances": {}}}, "pass it as `disturbances`"),
         ({"env_kwargs": {"duration": -1.0}}, "duration is -1"),
         ({"env_kwargs": {"duration": object()}}, "values that JSON can write"),
         ({"options": {"n_steps": 1, "batch_size": 2}, "envs": 1}, "arguments that go together"),

@@ -265,7 +265,7 @@ def test_the_adapter_is_the_single_biped_to_the_bit():
 def test_the_adapter_says_what_it_cannot_do():
     env = ResidualVecEnv(batch(2, duration=1.0), ResidualConfig("q450"))
     assert VecMonitor(env).num_envs == 2
-    with pytest.raises(OptionError, match="none: they share one environment"):
+    with pytest.raises(OptionError, match="one environment of a vector"):
         env.set_attr("x", 1)
     with pytest.raises(OptionError, match=r"decision_period is 0\.02"):
         ResidualVecEnv(batch(2, duration=1.0), ResidualConfig("q450", decision_period=0.02))

@@ -92,6 +92,12 @@ CLAIMS: tuple[Claim, ...] = (
             ),
             Claim(
                 name,
+                "tight tracking does not damp a swing: a kicked load never settles under tuned TDE",
+                ADDED,
+                settles(name, "recovery_time_s_push0_swing", {"tde-tight": False}),
+            ),
+            Claim(
+                name,
                 "the swing term needs no mass: its load error is below that of the control of the load, which knows it",
                 ADDED,
                 ordered(name, ("tde+swing", "geometric-load"), "rms_load_error_m"),
@@ -103,5 +109,11 @@ CLAIMS: tuple[Claim, ...] = (
                 ordered(name, ("artde+swing", "tde+swing"), "rms_load_error_m"),
             ),
         )
+    ),
+    Claim(
+        "Q-sling-late",
+        "a cable vector 60 ms late breaks the swing term: TDE with it crashes",
+        ADDED,
+        falls("Q-sling-late", {"tde+swing": True}),
     ),
 )

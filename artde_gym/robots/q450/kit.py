@@ -67,6 +67,13 @@ _SCENARIOS = (
         {**_SLUNG, "wind": {"scale": 2.0, "fan_position": LIFTED_FAN}},
         "Q-sling in wind of twice the strength",
     ),
+    Scenario(
+        "Q-sling-late",
+        _SLING,
+        {"duration": 45.0},
+        {**_SLUNG, "wind": {"scale": 1.0, "fan_position": LIFTED_FAN}, "cable_delay": {"steps": 4}},
+        "Q-sling with the cable measured 60 ms late",
+    ),
 )
 
 _LOOP = (6.0, 16.0)  # s, half a loop at full speed

@@ -14,6 +14,7 @@ from artde_gym.report.chart import Axis, Chart, height_of
 from artde_gym.report.diagram import Block, diagram
 from artde_gym.report.html import figure
 from artde_gym.report.run import Episode
+from artde_gym.report.signals import over_time
 
 PLANES = {"XZ": (0, 2), "YZ": (1, 2), "XY": (0, 1)}
 WIDTH = 400
@@ -22,7 +23,7 @@ GRID = 0.5  # m, spacing of the floor's grid
 LOAD = {
     "swing": ("swing (deg)", 180.0 / math.pi),
     "load_error": ("load's error (mm)", 1e3),
-    "cable_impulse": ("cable's impulse in a control period (Ns)", 1.0),
+    "cable_impulse": ("cable's impulse (Ns)", 1.0),
 }
 """Signal -> title of its chart, and factor."""
 SAMPLE_STRIDE = 4  # stored samples per drawn point: a path needs fewer than a signal
@@ -91,12 +92,12 @@ def _load(episode: Episode) -> list[str]:
         }
         if not lines:
             return []
-        x = Axis.of("time (s)", *(time for time, _ in lines.values()))
-        chart = Chart(f"{title} over time", x, Axis.of(title, *(values for _, values in lines.values()), zero=True))
+        chart = over_time(episode, title, title, [values for _, values in lines.values()], zero=True)
         for name, (time, values) in lines.items():
             chart.line(time, values, shown[name], text=name)
         charts[title.rpartition(" (")[0]] = chart.svg()
-    caption = f"The load on the cable, episode {episode.number} (seed {episode.seed}); zero while nothing hangs."
+    caption = f"The load on the cable, episode {episode.number} (seed {episode.seed}); zero while nothing hangs. "
+    caption += "The impulse is that of a control period."
     return [figure(caption, charts, shown)]
 
 
