@@ -23,10 +23,12 @@ from artde_gym.envs.interactive import InteractiveMixin
 from artde_gym.envs.options import disturbances_in, warn_of_idle
 from artde_gym.envs.view import View
 from artde_gym.errors import OptionError
+from artde_gym.motion.motion import Pose
 from artde_gym.multibody.manipulator import TOOL
 from artde_gym.robots.arm import task
 from artde_gym.robots.arm.panda import panda
 from artde_gym.robots.arm.reference import GRASP, PICK, RELEASE
+from artde_gym.robots.arm.scene import frame_angles
 from artde_gym.sim.engine import Camera, Engine
 from artde_gym.sim.factory import EngineName, make_engine, resolve_engine
 
@@ -107,7 +109,7 @@ class ArmTrackEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any]]):
         self.metrics_spec = task.metrics_spec(spec)
         self.observation_space, self.action_space = self.observation_layout.box(), self.action_layout.box()
         self._limit = np.array(spec.torque_limits)
-        self._limits = task.Limits(spec)
+        self._limits, self._frames = task.Limits(spec), frame_angles(spec)
         self._k, self._last, self._over = 0, tracking.last, True  # no step before the first reset
         self.words = tracking.words
         self._sample({})
@@ -170,6 +172,11 @@ class ArmTrackEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any]]):
     def close(self) -> None:
         self._engine.close()
         self._engine = self.view = CLOSED
+
+    def pose(self) -> Pose:
+        """Read where arm and payload are; joints as `artde_gym.robots.arm.scene` counts them."""
+        pose = super().pose()
+        return pose._replace(q=np.concatenate([pose.q, self._frames]))
 
     @property
     def elapsed(self) -> int:

@@ -20,7 +20,7 @@ from artde_gym.evaluation.result import Result
 from artde_gym.metrics_spec import MetricsSpec
 from artde_gym.scenarios import SCENARIOS
 
-UNITS = {"deg": ("deg", 3), "m": ("m", 4), "nm": ("Nm", 3), "n": ("N", 3), "ns": ("Ns", 4)}
+UNITS = {"deg": ("deg", 3), "m": ("m", 4), "mm": ("mm", 3), "nm": ("Nm", 3), "n": ("N", 3), "ns": ("Ns", 4)}
 """Unit in a column's name -> how it is printed, and its number of digits."""
 DIGITS = 4  # of metrics with another unit
 REFERENCE = "artde"

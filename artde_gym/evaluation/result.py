@@ -104,7 +104,7 @@ class Result:
         """Return the episodes of one controller in one scenario, indexed by their number."""
         chosen = (self.episodes["scenario"] == scenario) & (self.episodes["controller"] == controller)
         frame: pd.DataFrame = self.episodes.loc[chosen]
-        return frame.set_index("episode")
+        return frame.copy().set_index("episode")  # a copy is one block: many columns would be slow otherwise
 
     def values(self, scenario: str, controller: str, metric: str) -> Array:
         """Return a metric over the episodes of one controller in one scenario."""

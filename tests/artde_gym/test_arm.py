@@ -10,9 +10,11 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from scipy.spatial.transform import Rotation
 
 import controllers
 from artde_gym.errors import DisturbanceError, OptionError, RobotError
+from artde_gym.motion.scene import scene_of
 from artde_gym.multibody.dynamics import RigidBodyTree
 from artde_gym.robots.arm.panda import panda
 from artde_gym.robots.arm.reference import MULTI_SINE, PICK, reference
@@ -293,6 +295,30 @@ def test_a_file_that_no_law_has_seen_is_tracked(tmp_path, law, engine_name):
     assert fields["q"].shape[1] == 3
     assert set(env.unwrapped.words["joint"]) == {"turn", "lift", "reach"}
     env.close()
+
+
+def test_a_replay_shows_the_tool_where_it_is(tmp_path):
+    """Forward kinematics of a scene, written down once more: a body turns or slides in its parent's frame."""
+    path = tmp_path / "arm.urdf"
+    path.write_text(small_arm(tmp_path).read_text().replace("<origin xyz", '<origin rpy="0.3 -0.2 0.5" xyz'))
+    for arguments in ({}, {"robot": str(path), "armature": 0.2}):
+        env = make(engine="mujoco", disturbances={"initial_pose": {"joint": "all", "offset": 0.05}}, **arguments)
+        env.reset(seed=0)
+        shown, q = scene_of("arm", arguments, ID), np.asarray(env.unwrapped.pose().q)
+        places: list[tuple[np.ndarray, Rotation]] = []
+        for body in shown.bodies:
+            origin, turn = (np.zeros(3), Rotation.identity()) if body.parent is None else places[body.parent]
+            origin = origin + turn.apply(body.origin)
+            if body.axis is not None and body.joint is not None:
+                move = q[body.joint] * np.asarray(body.axis)
+                origin, turn = (
+                    (origin + turn.apply(move), turn) if body.slides else (origin, turn * Rotation.from_rotvec(move))
+                )
+            places.append((origin, turn))
+        number, point = shown.sites["tool"]
+        origin, turn = places[number]
+        np.testing.assert_allclose(origin + turn.apply(point), env.unwrapped.engine.site("tool"), atol=1e-9)
+        env.close()
 
 
 def test_reading_what_is_drawn(drawing_engine, tmp_path):

@@ -47,13 +47,14 @@ def test_json_holds_the_gains_that_a_controller_has() -> None:
     """Every preset, built for the robot, has the very gains that are listed."""
     envs: dict[str, Any] = {
         "ojas": gym.make("BipedWalk-Payload-v0", disable_env_checker=True, duration=0.2),
+        "arm": gym.make("ArmTrack-Payload-v0", disable_env_checker=True, duration=0.2, disturbances={}),
         "q450": gym.make("QuadSling-Payload-v0", disable_env_checker=True, duration=0.2),  # some laws need its cable
     }
     found = json.loads(listing("controllers", "--json"))
     assert [entry["name"] for entry in found] == list(registered_controllers())
     for entry in found:
         for preset in entry["presets"]:
-            if (entry["name"] in ("pid", "tde+kd") and preset["robot"] == "ojas") or entry["name"] == "tde+kd":
+            if (entry["name"] in ("pid", "tde+kd") and preset["robot"] != "q450") or entry["name"] == "tde+kd":
                 continue  # the law's own gains are computed from these
             policy = controllers.make(entry["name"], envs[preset["robot"]], preset=preset["preset"])
             built = {name: _plain(value) for name, value in named_gains(policy.gains).items()}

@@ -103,7 +103,7 @@ def test_the_law_with_extra_damping_is_stiffer() -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"robot": "arm"}, "ojas"),
+        ({"robot": "dog"}, "ojas"),
         ({"robot": "ojas", "law": "pid"}, "tde"),
         ({"robot": "ojas", "preset": "no"}, "thesis"),
         ({"robot": "ojas", "period": 0.0}, "period"),

@@ -79,4 +79,5 @@ KIT = RobotKit(
     frontier=_FRONTIER,
     motion=Motion("pick and place", 0.0, 12.0),
     push=Push("tool", 30.0),
+    scene="artde_gym.robots.arm.scene:scene",
 )
