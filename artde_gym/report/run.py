@@ -146,7 +146,7 @@ class Band(NamedTuple):
 
 
 class Strip(NamedTuple):
-    """What a robot shows below the time of every chart: bands, and what a caption says of them."""
+    """Bands that a robot shows below the time of every chart, with a caption about them."""
 
     caption: str
     bands: Sequence[Band]

@@ -1,6 +1,6 @@
 """An arm as replays show it: its boxes, and the path that its tool is meant to take.
 
-A scene's bodies have the orientation of their parents at zero. Where an arm's do not, a body without a shape comes
+A scene's bodies have the orientation of their parents at zero. If an arm's do not, a body without a shape comes
 between them, turned by a constant angle, which `frame_angles` adds to the joints of a pose.
 """
 
