@@ -4,6 +4,7 @@ python scripts/switching.py held-out   gaits, frictions and payloads by which no
                                        without and with the ground force
 python scripts/switching.py tables     the tables of what there is of that
 python scripts/switching.py flags      S1-L4 and S2-L4 with contact flags that lie
+python scripts/switching.py cost       computing time of a call
 
 All in MuJoCo, in vector environments and one process; walks of 20 s. A world is a gait, a friction and a payload, with
 one walk under each law. A part that is in the folder already is not run again.
@@ -13,7 +14,8 @@ from __future__ import annotations
 
 import argparse
 import itertools
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +43,7 @@ PARTS += [(1, share, gait) for share, gait in ((0, 0), (45, 0), (33, 1), (33, 0)
 """L in ms, ground force, number of the gait, in the order in which they are run."""
 DURATION, PUSHES = 20.0, (8.0, 13.0)  # s; of S3, which has them at 28 and 37 s
 SEED = 1919
+FEW = 5  # worlds, below which an interval says nothing
 TOUCHDOWN, UNLOADED = 0.06, 0.2  # s after a landing, s of no load before it
 
 _SWITCHED = DRIVES["ojas"].presets["tde-switched", "support"].gains
@@ -148,48 +151,56 @@ def held_out(folder: Path) -> None:
 
 
 def tables(folder: Path) -> str:
-    """Return the tables of the parts in the folder."""
+    """Return tables of falls and of the switched laws over their rivals, of the parts there are."""
     found = pd.concat(pd.read_csv(file) for file in sorted(folder.glob("held-out-*.csv")))
-    text: list[str] = []
-    for ms, name, share in itertools.product((4, 1), FORMS, sorted(SHARES)):
+    cases: dict[str, dict[str, pd.DataFrame]] = {}
+    for ms, share, name in itertools.product((4, 1), sorted(SHARES), FORMS):
         chosen = found.loc[(found["ms"] == ms) & (found["form"] == name) & (found["share"] == share)]
         if len(chosen):
-            text.append(f"{name}, L = {ms} ms, ground force {share} %\n\n{table(chosen)}\n")
-    return "\n".join(text)
-
-
-def table(found: pd.DataFrame) -> str:
-    """Return each law's means over the walks that end, and the ratios of the switched law to its rivals."""
-    lines = ["| law | fell | " + " | ".join(f"{text}, {unit}" for text, unit, _ in COLUMNS.values()) + " |"]
-    lines.append("|---|" + "---|" * (1 + len(COLUMNS)))
-    by_law = {law: found[found["law"] == law].set_index("world").sort_index() for law in LAWS}
-    for law, rows in by_law.items():
-        whole = rows.loc[~rows["fell"].astype(bool)]
-        cells = [f"{whole[column].mean():.{digits}f}" for column, (_, _, digits) in COLUMNS.items()]
-        lines.append(f"| {law} | {len(rows) - len(whole)}/{len(rows)} | " + " | ".join(cells) + " |")
-    lines += [
-        "",
-        "| switched / rival, worlds where both walk | worlds | "
-        + " | ".join(text for text, _, _ in COLUMNS.values())
-        + " |",
+            by_law = {law: chosen[chosen["law"] == law].set_index("world").sort_index() for law in LAWS}
+            cases[f"{name}, {ms} ms, {share} %"] = by_law
+    text = [
+        table("falls", list(LAWS), {case: [falls(rows) for rows in by_law.values()] for case, by_law in cases.items()})
     ]
-    lines.append("|---|" + "---|" * (1 + len(COLUMNS)))
-    for law in LAWS:
-        own = law.split(",")[0] + ", switched"
-        if law != own:
-            lines.append(ratios(law, by_law[own], by_law[law]))
-    return "\n".join(lines)
+    rivals = [law for law in LAWS if not law.endswith("switched")]
+    for column, (title, _, _) in COLUMNS.items():
+        rows = {case: [ratio(by_law, rival, column) for rival in rivals] for case, by_law in cases.items()}
+        text.append(table(f"{title}, switched over", rivals, rows))
+    title = "means of the walks that end: " + ", ".join(f"{title} ({unit})" for title, unit, _ in COLUMNS.values())
+    text.append(
+        table(title, list(LAWS), {case: [means(rows) for rows in by_law.values()] for case, by_law in cases.items()})
+    )
+    return "\n\n".join(text)
 
 
-def ratios(rival: str, ours: pd.DataFrame, theirs: pd.DataFrame) -> str:
-    """Return a row of ratios of means with 95 % intervals (bootstrap over worlds)."""
-    both = ours.index[(~ours["fell"].astype(bool) & ~theirs["fell"].astype(bool)).to_numpy()]
-    cells: list[str] = []
-    for column in COLUMNS:
-        gain = statistics.improvement(ours.loc[both, column], theirs.loc[both, column])
-        value, low, high = (1 - one / 100 for one in (gain.value, gain.high, gain.low))
-        cells.append(f"{value:.2f} ({low:.2f}..{high:.2f})" if gain.n > 1 else "")
-    return f"| {rival} | {len(both)} | " + " | ".join(cells) + " |"
+def table(title: str, heads: Sequence[str], rows: Mapping[str, Sequence[str]]) -> str:
+    lines = [f"| {title} | " + " | ".join(heads) + " |", "|---|" + "---|" * len(heads)]
+    return "\n".join(lines + [f"| {name} | " + " | ".join(cells) + " |" for name, cells in rows.items()])
+
+
+def walked(rows: pd.DataFrame) -> pd.DataFrame:
+    return rows.loc[~rows["fell"].astype(bool).to_numpy()]
+
+
+def falls(rows: pd.DataFrame) -> str:
+    return f"{len(rows) - len(walked(rows))}/{len(rows)}"
+
+
+def means(rows: pd.DataFrame) -> str:
+    whole = walked(rows)
+    numbers = (f"{whole[column].mean():.{digits}f}" for column, (_, _, digits) in COLUMNS.items())
+    return ", ".join(numbers) if len(whole) else ""
+
+
+def ratio(by_law: Mapping[str, pd.DataFrame], rival: str, column: str) -> str:
+    """Return a ratio of means over the worlds in which both walk, their number, and from `FEW` on its 95 % interval."""
+    ours, theirs = by_law[rival.split(",")[0] + ", switched"], by_law[rival]
+    both = walked(ours).index.intersection(walked(theirs).index)
+    if len(both) == 0:
+        return ""
+    gain = statistics.improvement(ours.loc[both, column], theirs.loc[both, column])
+    value, low, high = (1 - one / 100 for one in (gain.value, gain.high, gain.low))
+    return f"{value:.2f} ({low:.2f}..{high:.2f}), {gain.n}" if gain.n >= FEW else f"{value:.2f}, {gain.n}"
 
 
 def lying(kind: str, contact: slice) -> Callable[[Any], Any]:
@@ -239,13 +250,45 @@ def flags(folder: Path, walked: int = 4) -> None:
             print(f"| {text} | {rows[first][3]['form']} | {rows[first][0]} | {fell}/{walked} | {error:.3f} |")
 
 
+def cost(_: Path, turns: int = 15) -> None:
+    """CPU time of a call on the observations of a stride (L = 1 ms), the laws in turns in one process; medians."""
+    env: Any = gym.make(
+        "BipedWalk-Payload-v0", engine="mujoco", duration=8.0, disturbances={}, disable_env_checker=True
+    )
+    observation, _ = env.reset(seed=0)
+    names = [f"{law}{end}" for law in ("tde", "atde", "artde") for end in ("", "-switched")]
+    policies = {name: controllers.make(name, env) for name in names}
+    seen, state = [observation], None
+    for _step in range(5000):
+        action, state = policies["tde"].predict(seen[-1], state)
+        seen.append(env.step(action)[0])
+    times: dict[str, list[float]] = {name: [] for name in names}
+    for name in names * turns:
+        own, begin = None, time.process_time()
+        for observation in seen[3000:]:
+            _, own = policies[name].predict(observation, own)
+        times[name].append(1e6 * (time.process_time() - begin) / 2001)
+    print("| law | us a call | more than without switching |\n|---|---|---|")
+    for name in names:
+        more = np.median(np.array(times[name]) - times[name.removesuffix("-switched")])
+        print(f"| {name} | {np.median(times[name]):.1f} | {more:.1f} |")
+
+
+FIGURES: dict[str, Callable[[Path], None]] = {
+    "held-out": held_out,
+    "tables": lambda folder: print(tables(folder)),
+    "flags": flags,
+    "cost": cost,
+}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("figure", choices=("held-out", "tables", "flags"))
+    parser.add_argument("figure", choices=FIGURES)
     parser.add_argument("--out", type=Path, default=Path("runs/switching"))
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    {"held-out": held_out, "tables": lambda folder: print(tables(folder)), "flags": flags}[options.figure](options.out)
+    FIGURES[options.figure](options.out)
 
 
 if __name__ == "__main__":

@@ -146,7 +146,7 @@ class Band(NamedTuple):
 
 
 class Strip(NamedTuple):
-    """Bands that a robot shows below the time of every chart, with a caption about them."""
+    """Bands that a robot shows below the time of every chart, and a sentence on them for captions."""
 
     caption: str
     bands: Sequence[Band]

@@ -29,6 +29,7 @@ from controllers.laws.vectors import joined
 from documentation.architecture import rooms
 from documentation.plant import ARM, DURATION, LIFT, LOADED, PUSHED, Plant, Run, modeled, simulate
 from documentation.sling import swing
+from documentation.support import switched
 
 ARM_PERIOD, LIFT_PERIOD = 0.004, 0.015  # s
 NOISE = 0.02  # m/s, of a measured velocity
@@ -226,6 +227,7 @@ FIGURES: dict[str, Callable[[], str]] = {
     "computed-torque": computed,
     "geometric": geometric,
     "swing": swing,
+    "switched": switched,
 }
 """Name on a page -> the figure as HTML."""
 
