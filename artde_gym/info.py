@@ -104,10 +104,15 @@ class SampledTable:
         self._known: dict[str, Mask] = {}
         self._told: list[tuple[str, NDArray[Any], Mask | None]] = []  # mask None: all environments have the entry
 
-    def enter(self, rows: Mapping[int, Mapping[str, Any]]) -> None:
-        """Replace the values of some environments."""
-        for row, numbers in rows.items():
-            self._enter(row, numbers)
+    def enter(self, rows: NDArray[np.intp], values: Mapping[str, NDArray[Any]]) -> None:
+        """Replace the values of some environments; each array has one item for each of them."""
+        for name, known in self._known.items():
+            known[rows] = name in values
+        for name, cells in values.items():
+            self._known.setdefault(name, np.zeros(self._n, np.bool_))[rows] = True
+            column = self._columns[name] = self._fitted(self._columns.get(name), cells[0])
+            column[rows] = 0
+            column[(rows, *map(slice, cells.shape[1:]))] = cells
         self._told = [
             (name, self._columns[name], None if known.all() else known)
             for name, known in self._known.items()
@@ -122,16 +127,6 @@ class SampledTable:
             if known is not None:
                 told[f"_{name}"] = known
         return told
-
-    def _enter(self, row: int, numbers: Mapping[str, Any]) -> None:
-        for name, known in self._known.items():
-            known[row] = name in numbers
-        for name, value in numbers.items():
-            self._known.setdefault(name, np.zeros(self._n, np.bool_))[row] = True
-            cell = np.asarray(value)
-            column = self._columns[name] = self._fitted(self._columns.get(name), cell)
-            column[row] = 0
-            column[(row, *map(slice, cell.shape))] = cell
 
     def _fitted(self, column: NDArray[Any] | None, cell: NDArray[Any]) -> NDArray[Any]:
         """Return the column, enlarged to fit a cell."""

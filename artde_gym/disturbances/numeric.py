@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from artde_gym.disturbances.kinds import DISTURBANCES, Parameter
 
@@ -21,16 +22,23 @@ Words = Mapping[str, Sequence[str]]
 
 def numeric(sampled: Mapping[str, Any], words: Words) -> dict[str, Any]:
     """Return named numbers, with indices for words and arrays for lists of entries."""
-    told: dict[str, Any] = {}
-    for kind, value in sampled.items():
-        entries = value if DISTURBANCES[kind].multiple else (value,)
+    rows = numeric_rows([sampled], words)
+    return {name: value[0] if value.ndim > 1 else value.item() for name, value in rows.items()}
+
+
+def numeric_rows(sampled: Sequence[Mapping[str, Any]], words: Words) -> dict[str, NDArray[Any]]:
+    """Return the numbers of `numeric` of several samples of the same disturbances, as arrays (samples, ...)."""
+    told: dict[str, NDArray[Any]] = {}
+    for kind, value in sampled[0].items():
+        multiple = DISTURBANCES[kind].multiple
         for parameter in DISTURBANCES[kind].parameters:
-            if not all(parameter.name in entry for entry in entries):
+            name = parameter.name
+            if not all(name in entry for entry in (value if multiple else (value,))):
                 continue  # one of the parameters of which only one is given
-            told[f"disturbance.{kind}.{parameter.name}"] = (
-                np.array([number_of(parameter, entry[parameter.name], words) for entry in value])
-                if DISTURBANCES[kind].multiple
-                else number_of(parameter, value[parameter.name], words)
+            told[f"disturbance.{kind}.{name}"] = np.array(
+                [[number_of(parameter, entry[name], words) for entry in own[kind]] for own in sampled]
+                if multiple
+                else [number_of(parameter, own[kind][name], words) for own in sampled]
             )
     return told
 

@@ -6,7 +6,7 @@ step, the wind is taken at the vehicle's position in the middle of the step, and
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -23,7 +23,6 @@ from artde_gym.disturbances.schedule import ATTACHED, DROPPED, NEVER, PUSH_BEGIN
 from artde_gym.disturbances.wind import GRID, Air, advance, air, processes, velocity
 from artde_gym.kit import PAYLOAD
 from artde_gym.multibody.lag import follow, lag_shares
-from artde_gym.multibody.spec import Vector
 from artde_gym.robots.q450 import model as robot
 from artde_gym.robots.q450 import task
 from artde_gym.sim.cables import Cables
@@ -88,48 +87,76 @@ class QuadrotorBatchSim:
         self.pulled = np.zeros(n, dtype)
         self._effects = Effects(n, task.WORDS)
 
-    def begin(self, vehicle: int, sampled: Mapping[str, Any], key: np.uint64) -> None:
-        """Begin an episode of one vehicle in equilibrium, with sampled disturbances and the key of its wind."""
-        self._begun[vehicle] = self._step
-        self._begin_rotors(vehicle, sampled)
-        self._effects.begin(vehicle, sampled)
-        wind = sampled.get("wind")
-        self._air[:, vehicle] = air(wind)
-        self._keep[:, vehicle], self._kick[:, vehicle] = processes(wind)
-        self._wind[:, vehicle] = 0.0
-        self._keys[vehicle] = key
-        self._windy |= wind is not None
-        self._ground_effect[vehicle] = sampled.get("ground_effect", {}).get("strength", 0.0)
-
-        factor = sampled.get("mass_scale", {}).get("factor", 1.0)
-        bare = MassProperties(factor * robot.MASS, (0.0, 0.0, 0.0), factor * np.diag(robot.INERTIA))
-        events = [*self._push_events(vehicle, sampled), *self._loss_events(vehicle, sampled)]
-        self._fix(vehicle, bare, False)
+    def begin(self, vehicles: NDArray[np.intp], sampled: Sequence[Mapping[str, Any]], keys: NDArray[np.uint64]) -> None:
+        """Begin episodes of some vehicles in equilibrium, with sampled disturbances and the keys of their winds."""
+        self._begun[vehicles], self._keys[vehicles] = self._step, keys
+        self._begin_rotors(vehicles, sampled)
+        self._begin_air(vehicles, sampled)
+        factor = np.array([own.get("mass_scale", {}).get("factor", 1.0) for own in sampled])
+        inertia = factor[:, None, None] * np.diag(robot.INERTIA)
+        bare = MassProperties(factor * robot.MASS, np.zeros((len(vehicles), 3)), inertia)
         if self.cables is not None:
-            self.cables.clear(vehicle)
-        self.pulled[vehicle] = 0.0
-        payload = sampled.get("payload")
-        start: Vector = task.start(sampled, self._lift)
-        if payload is not None and payload["detach_time"] > payload["attach_time"]:
-            attach, drop = self._changes(vehicle, bare, payload)
-            if payload["attach_time"] == 0:
-                self.bodies.place(vehicle, start)
+            self.cables.clear(vehicles)
+        self.pulled[vehicles] = 0.0
+        starts = np.array([task.start(own, self._lift) for own in sampled])
+        self._carries[vehicles] = False
+        self.bodies.begin(vehicles, bare, starts.T)
+        payloads = [own.get("payload") for own in sampled]
+        carrying = [row for row, payload in enumerate(payloads) if payload is not None and _is_carried(payload)]
+        changes = self._begin_payloads(vehicles, carrying, payloads, bare, starts) if carrying else {}
+        for row, (vehicle, own) in enumerate(zip(vehicles.tolist(), sampled, strict=True)):
+            self._effects.begin(vehicle, own)
+            events = [*self._push_events(vehicle, own), *self._loss_events(vehicle, own), *changes.get(row, ())]
+            events.sort(key=lambda event: event.step)
+            self._agenda[vehicle] = events[::-1]
+            self._set_due(vehicle)
+        self._soonest = self._due.min()
+
+    def _begin_air(self, vehicles: NDArray[np.intp], sampled: Sequence[Mapping[str, Any]]) -> None:
+        winds = [own.get("wind") for own in sampled]
+        self._air[:, vehicles] = np.array([air(wind) for wind in winds]).T
+        self._keep[:, vehicles], self._kick[:, vehicles] = np.array([processes(wind) for wind in winds]).transpose(
+            1, 2, 0
+        )
+        self._wind[:, vehicles] = 0.0
+        self._windy |= any(wind is not None for wind in winds)
+        self._ground_effect[vehicles] = [own.get("ground_effect", {}).get("strength", 0.0) for own in sampled]
+
+    def _begin_payloads(
+        self,
+        vehicles: NDArray[np.intp],
+        rows: list[int],
+        payloads: Sequence[Mapping[str, Any] | None],
+        bare: MassProperties,
+        starts: Array,
+    ) -> dict[int, list[_Event]]:
+        """Give the vehicles in some rows the payloads with which they begin; return their later events by row."""
+        carried = {row: payload for row in rows if (payload := payloads[row]) is not None}
+        fixed = composite(_some(bare, rows), _balls(list(carried.values())))
+        events: dict[int, list[_Event]] = {}
+        rigid = []  # rows, of all vehicles and of these
+        for number, (row, payload) in enumerate(carried.items()):
+            vehicle = int(vehicles[row])
+            attach, drop = self._changes(vehicle, _one(bare, row), _one(fixed, number), payload)
+            events[row] = own = []
+            if payload["attach_time"] > 0:
+                own.append(_Event(round(payload["attach_time"] / GRID), (ATTACHED,), attach))
+            elif payload["cable"]:
                 attach()
             else:
-                events.append(_Event(round(payload["attach_time"] / GRID), (ATTACHED,), attach))
-            events.append(_Event(round(payload["detach_time"] / GRID), (DROPPED,), drop))
-        if not (self.cables is not None and self.cables.held[vehicle]):
-            self.bodies.place(vehicle, start)
-        events.sort(key=lambda event: event.step)
-        self._agenda[vehicle] = events[::-1]
-        self._await(vehicle)
+                rigid.append((row, number))
+            own.append(_Event(round(payload["detach_time"] / GRID), (DROPPED,), drop))
+        if rigid:
+            whole, part = map(list, zip(*rigid, strict=True))
+            self._carries[vehicles[whole]] = True
+            self.bodies.begin(vehicles[whole], _some(fixed, part), starts[whole].T)
+        return events
 
     def _changes(
-        self, vehicle: int, bare: MassProperties, payload: Mapping[str, Any]
+        self, vehicle: int, bare: MassProperties, fixed: MassProperties, payload: Mapping[str, Any]
     ) -> tuple[Callable[[], None], Callable[[], None]]:
         """Return the functions that attach a payload and that drop it."""
         if not payload["cable"]:
-            fixed = composite(bare, _ball(payload))
             return partial(self._fix, vehicle, fixed, True), partial(self._fix, vehicle, bare, False)
         if self.cables is None:
             self.cables = Cables(len(self._begun), self.thrusts.dtype)
@@ -202,18 +229,18 @@ class QuadrotorBatchSim:
         cables.kick(self.bodies, GRID, force, self._wind_at(cables.position) if self._windy else None)
         self.pulled += GRID * cables.tension
 
-    def _begin_rotors(self, vehicle: int, sampled: Mapping[str, Any]) -> None:
-        hover = task.hover_thrusts(sampled, self._lift)
-        self.thrusts[:, vehicle] = hover
-        self.wrenches[:, vehicle] = robot.wrench(*hover)
-        constant = sampled.get("motor_lag", {}).get("time_constant", robot.ROTOR_LAG)
-        self._shares[:, vehicle] = lag_shares(constant, GRID)
-        self._left[:, vehicle] = 1.0
-        self._delay[vehicle] = sampled.get("action_delay", {}).get("steps", 0)
-        if self._late is None and self._delay[vehicle]:
+    def _begin_rotors(self, vehicles: NDArray[np.intp], sampled: Sequence[Mapping[str, Any]]) -> None:
+        hover = np.array([task.hover_thrusts(own, self._lift) for own in sampled]).T
+        self.thrusts[:, vehicles] = hover
+        self.wrenches[:, vehicles] = robot.wrench(*hover)
+        constants = [own.get("motor_lag", {}).get("time_constant", robot.ROTOR_LAG) for own in sampled]
+        self._shares[:, vehicles] = np.array([lag_shares(constant, GRID) for constant in constants]).T
+        self._left[:, vehicles] = 1.0
+        self._delay[vehicles] = [own.get("action_delay", {}).get("steps", 0) for own in sampled]
+        if self._late is None and self._delay[vehicles].any():
             self._late = np.zeros((DELAY_SLOTS, *self.thrusts.shape), self.thrusts.dtype)
         if self._late is not None:
-            self._late[..., vehicle] = hover
+            self._late[..., vehicles] = hover
 
     def _aims(self, commands: Array) -> Array:
         """Return the rotors' thrust targets (4, n) (N) for a control period that begins with these commands."""
@@ -319,11 +346,31 @@ class QuadrotorBatchSim:
             self._await(vehicle)
 
     def _await(self, vehicle: int) -> None:
-        agenda = self._agenda[vehicle]
-        self._due[vehicle] = self._begun[vehicle] + agenda[-1].step if agenda else NEVER
+        self._set_due(vehicle)
         self._soonest = self._due.min()
 
+    def _set_due(self, vehicle: int) -> None:
+        agenda = self._agenda[vehicle]
+        self._due[vehicle] = self._begun[vehicle] + agenda[-1].step if agenda else NEVER
 
-def _ball(payload: Mapping[str, Any]) -> MassProperties:
-    moment = 0.4 * payload["mass"] * PAYLOAD_RADIUS**2
-    return MassProperties(payload["mass"], payload["position"], moment * np.eye(3))
+
+def _is_carried(payload: Mapping[str, Any]) -> bool:
+    """Return True if a payload is attached before it is dropped."""
+    return payload["detach_time"] > payload["attach_time"]
+
+
+def _balls(payloads: Sequence[Mapping[str, Any]]) -> MassProperties:
+    """Return the mass properties of payloads, one in each row."""
+    mass = np.array([payload["mass"] for payload in payloads])
+    moment = 0.4 * mass * PAYLOAD_RADIUS**2
+    return MassProperties(
+        mass, np.array([payload["position"] for payload in payloads]), moment[:, None, None] * np.eye(3)
+    )
+
+
+def _one(properties: MassProperties, row: int) -> MassProperties:
+    return MassProperties(*(part[row] for part in properties))
+
+
+def _some(properties: MassProperties, rows: list[int]) -> MassProperties:
+    return MassProperties(*(part[rows] for part in properties))

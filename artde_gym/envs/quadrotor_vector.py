@@ -120,11 +120,14 @@ class QuadInfinityPayloadVectorEnv(BaseVectorEnv):
         return task.parse(disturbances)
 
     def _start(self, drawn: Mapping[int, Mapping[str, Any]]) -> None:
-        for i, sampled in drawn.items():
-            part, fleet = self._fleets[i // FLEET]
-            keys = draw_keys(self._np_random[i], task.STREAMS)
-            fleet.begin(i - part.start, sampled, keys[0])
-            self._sensors.begin(i, sampled, keys[1:])
+        keys = np.array([draw_keys(self._np_random[i], task.STREAMS) for i in drawn])
+        vehicles, sampled = np.fromiter(drawn, np.intp, len(drawn)), list(drawn.values())
+        for part, fleet in self._fleets:
+            rows = slice(*np.searchsorted(vehicles, [part.start, part.stop]).tolist())
+            if sampled[rows]:
+                fleet.begin(vehicles[rows] - part.start, sampled[rows], keys[rows, 0])
+        for i, own, some in zip(drawn, sampled, keys[:, 1:], strict=True):
+            self._sensors.begin(i, own, some)
 
     def _advance(self, commands: Array, goes_on: Mask) -> dict[int, list[str]]:
         self._before = [fleet.thrusts for _, fleet in self._fleets]

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from artde_gym.arguments import check_seed, real_array
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
-from artde_gym.disturbances.numeric import Words, numeric
+from artde_gym.disturbances.numeric import Words, numeric_rows
 from artde_gym.disturbances.schedule import EVENTS
 from artde_gym.envs.closed_env import require_open
 from artde_gym.envs.options import disturbances_in, warn_of_idle
@@ -303,7 +303,11 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
             self._table = SampledTable(self.num_envs)  # without the columns that earlier disturbances needed
         for i, sampled in drawn.items():
             self._sampled[i] = sampled
-        self._table.enter({i: numeric(sampled, self.words) for i, sampled in drawn.items()})
+        alike: dict[int, list[int]] = {}  # environments with the same disturbances
+        for i in drawn:
+            alike.setdefault(id(given[i]), []).append(i)
+        for some in alike.values():
+            self._table.enter(np.array(some), numeric_rows([drawn[i] for i in some], self.words))
 
     def _info(self, mask: Mask, told: Columns) -> dict[str, Any]:
         """Return the `info` of the environments in a mask: data that policies must not use.

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike
+from numpy.typing import DTypeLike, NDArray
 
 from artde_gym.arrays import Array
 from artde_gym.multibody.dynamics import GRAVITY
 from artde_gym.multibody.spec import Vector
 from artde_gym.sim.cable import ARRAYS, Body, Load, drag, pull
-from artde_gym.sim.rigid_bodies import RigidBodies, cross, times
+from artde_gym.sim.rigid_bodies import ALL, RigidBodies, cross, times
 
 FREE = 1e3  # m, of the cable that never pulls where nothing hangs
 
@@ -37,8 +37,8 @@ class Cables:
         self._gravity = np.zeros(n, dtype)
         self._still = np.zeros((3, n), dtype)  # air
 
-    def clear(self, body: int) -> None:
-        """Take a body's load away."""
+    def clear(self, body: int | NDArray[np.intp]) -> None:
+        """Take the loads of one body or several away."""
         self.release(body)
         self.position[:, body] = self.velocity[:, body] = self._gravity[body] = 0.0
 
@@ -47,11 +47,12 @@ class Cables:
         self._hook[:, body] = hook
         self.length[body], self._inverse_mass[body] = length, 1.0 / mass
         self._gravity[body], self.held[body] = GRAVITY, True
-        self.position[:, body] = self._hooks(bodies)[:, body] - (0.0, 0.0, length)
-        self.velocity[:, body] = self._hook_velocities(bodies)[:, body]
+        own = slice(body, body + 1)
+        self.position[:, body] = self._hooks(bodies, own)[:, 0] - (0.0, 0.0, length)
+        self.velocity[:, body] = self._hook_velocities(bodies, own)[:, 0]
 
-    def release(self, body: int) -> None:
-        """Let go of a body's load, which falls from now on."""
+    def release(self, body: int | NDArray[np.intp]) -> None:
+        """Let go of the loads of one body or several, which fall from now on."""
         self.held[body] = False
         self.length[body], self.tension[body] = FREE, 0.0
 
@@ -98,11 +99,13 @@ class Cables:
         turning = self.tension * (inverse_inertia * np.stack(found.moment))
         bodies.add_kick(duration, bodies.inverse_mass * along, turning, taut)
 
-    def _hooks(self, bodies: RigidBodies) -> Array:
-        return bodies.com + times(bodies.rot, self._hook - bodies.arm)
+    def _hooks(self, bodies: RigidBodies, some: slice = ALL) -> Array:
+        arm = self._hook[:, some] - bodies.arm[:, some]
+        return bodies.com[:, some] + times(bodies.rot[..., some], arm)
 
-    def _hook_velocities(self, bodies: RigidBodies) -> Array:
-        return bodies.com_velocity + times(bodies.rot, cross(bodies.rates, self._hook - bodies.arm))
+    def _hook_velocities(self, bodies: RigidBodies, some: slice = ALL) -> Array:
+        arm = self._hook[:, some] - bodies.arm[:, some]
+        return bodies.com_velocity[:, some] + times(bodies.rot[..., some], cross(bodies.rates[:, some], arm))
 
 
 def _each(rows: Array) -> Any:

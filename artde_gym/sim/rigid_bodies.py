@@ -15,7 +15,7 @@ mass. w_m = w + h/2 w', with w' of the previous kick, approximates w in the midd
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -26,27 +26,34 @@ from artde_gym.multibody.spec import Vector
 
 ALL = slice(None)
 
+Integers = NDArray[np.intp]
+
 _NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 
 
 class MassProperties(NamedTuple):
-    """Mass (kg), center of mass in the body frame (m) and inertia about it (3, 3) (kg m^2) of a rigid body."""
+    """Mass (kg), center of mass in the body frame (m) and inertia about it (kg m^2) of a rigid body, or of several.
 
-    mass: float
-    com: Vector
+    The arrays are (...), (..., 3) and (..., 3, 3).
+    """
+
+    mass: Any
+    com: Any
     inertia: Array
 
 
 def composite(*parts: MassProperties) -> MassProperties:
     """Combine bodies that are fixed to each other."""
+    masses = [np.asarray(part.mass)[..., None] for part in parts]
     mass = total(part.mass for part in parts)
-    com = np.sum([part.mass * np.asarray(part.com) for part in parts], axis=0) / mass
-    inertia = np.zeros((3, 3))
-    for part in parts:
+    com = np.sum([own * np.asarray(part.com) for own, part in zip(masses, parts, strict=True)], axis=0)
+    com /= np.asarray(mass)[..., None]
+    inertia = np.zeros((*com.shape, 3))
+    for own, part in zip(masses, parts, strict=True):
         arm = np.asarray(part.com) - com
-        inertia += part.inertia + part.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-    x, y, z = com.tolist()
-    return MassProperties(mass, (x, y, z), inertia)
+        square = np.reshape([one @ one for one in arm.reshape(-1, 3)], (*arm.shape[:-1], 1, 1))
+        inertia += part.inertia + own[..., None] * (square * np.eye(3) - arm[..., :, None] * arm[..., None, :])
+    return MassProperties(mass, com, inertia)
 
 
 class RigidBodies:
@@ -74,20 +81,32 @@ class RigidBodies:
     def set_properties(self, body: int, properties: MassProperties) -> None:
         """Change a body's constants without changing the motion of its origin."""
         point, velocity = self.origin(body), self.origin_velocity(body)
-        x, y, z = self._arm[:, body] = properties.com
-        self._arm_cross[..., body] = ((0.0, z, -y), (-z, 0.0, x), (y, -x, 0.0))
-        self._inverse_mass[body] = 1.0 / properties.mass
-        self._inertia[..., body] = properties.inertia
-        self._inverse_inertia[..., body] = np.linalg.inv(properties.inertia)
+        self._set_constants(body, properties)
         self.com[:, body] += point - self.origin(body)
         self.com_velocity[:, body] += velocity - self.origin_velocity(body)
 
-    def place(self, body: int, origin: Vector) -> None:
-        """Put an upright body with its origin at a point (m), at rest."""
-        self.quat_xyzw[:, body] = (0.0, 0.0, 0.0, 1.0)
-        self.rot[..., body] = np.eye(3)
+    def place(self, body: int | Integers, origin: Vector | Array) -> None:
+        """Put upright bodies with their origins at points (m), at rest."""
+        self.quat_xyzw[:3, body], self.quat_xyzw[3, body] = 0.0, 1.0
+        for axis in range(3):
+            self.rot[:, axis, body] = 0.0
+            self.rot[axis, axis, body] = 1.0
         self.rates[:, body] = self.com_velocity[:, body] = self._acceleration[:, body] = 0.0
         self.com[:, body] = np.add(origin, self._arm[:, body])
+
+    def begin(self, bodies: Integers, properties: MassProperties, origins: Array) -> None:
+        """Give bodies their constants, and put them upright with their origins at points (3, n) (m), at rest."""
+        self._set_constants(bodies, properties)
+        self.place(bodies, origins)
+
+    def _set_constants(self, body: int | Integers, properties: MassProperties) -> None:
+        inertia = properties.inertia
+        x, y, z = self._arm[:, body] = np.asarray(properties.com).T
+        for (row, column), value in (((0, 1), z), ((0, 2), -y), ((1, 0), -z), ((1, 2), x), ((2, 0), y), ((2, 1), -x)):
+            self._arm_cross[row, column, body] = value
+        self._inverse_mass[body] = 1.0 / properties.mass
+        self._inertia[..., body] = np.moveaxis(inertia, (-2, -1), (0, 1))
+        self._inverse_inertia[..., body] = np.moveaxis(np.linalg.inv(inertia), (-2, -1), (0, 1))
 
     @property
     def arm(self) -> Array:
