@@ -80,7 +80,7 @@ def evaluate(
         renamed_option("--trace-hz", "--record-hz")
         record_hz = trace_hz
     if scenario is None:
-        env = env or WALK
+        env = WALK if env is None else env
         scenario = ",".join(main_scenarios(env)) or None
         if scenario is not None and vectorized:
             scenario = scenario.split(",")[0]

@@ -52,7 +52,7 @@ def cells_of(
         disturbances = current_disturbances(disturbances, told=True)
     if names is None:
         own = {} if disturbances is None else {"disturbances": disturbances}
-        env_id = env_id or DEFAULT_ENVIRONMENT
+        env_id = DEFAULT_ENVIRONMENT if env_id is None else env_id
         return [Cell(CUSTOM, env_id, {**with_engine(env_id, kwargs, vectorized), **own})]
     cells = []
     for entry in _scenarios(env_id, names):

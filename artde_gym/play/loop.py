@@ -22,13 +22,14 @@ def run(
 ) -> None:
     """Play until `going` returns False; slower than real time if the simulation cannot keep up.
 
-    Only this thread touches the simulation.
+    It waits while no browser watches. Only this thread touches the simulation.
     """
     server.disturbances = lambda: game.record.disturbances()
     start, version, news, due = start_text(game), -1, News(), clock()
     while going():
         obey(game, server)
-        game.advance(1.0 / RATE)
+        if server.watched:
+            game.advance(1.0 / RATE)
         told = news.told if game.version == version else told_text(game)
         version, news = game.version, News(start, told, game.frame())
         server.tell(news)

@@ -127,6 +127,11 @@ class Server:
         return _is_loopback(self._host)
 
     @property
+    def watched(self) -> bool:
+        """True while any browser is connected."""
+        return bool(self._slots)
+
+    @property
     def address(self) -> str:
         """The address of the page, with its token."""
         host = socket.gethostname() if self._host in ("0.0.0.0", "") else self._host

@@ -315,10 +315,15 @@ class Deaf:
     """A server without browsers."""
 
     def __init__(self, orders: Any = ()) -> None:
-        self.orders, self.news = _Queue(orders), []
+        self.orders, self.news, self.watched = _Queue(orders), [], True
 
     def tell(self, news: Any) -> None:
         self.news = [*self.news[-3:], news]
+
+
+def deaf(orders: Any = ()) -> Any:
+    """In place of a `Server`."""
+    return Deaf(orders)
 
 
 class _Queue:
@@ -332,24 +337,32 @@ class _Queue:
 
 
 def test_a_slow_computer_takes_its_time_and_a_fast_one_waits():
-    game, server, now, waits = flying(), Deaf([{"do": "speed", "value": 2.0}]), [0.0], []
+    game, server, now, waits = flying(), deaf([{"do": "speed", "value": 2.0}]), [0.0], []
 
     def sleep(duration: float) -> None:
         waits.append(duration)
         now[0] += duration
 
-    run(game, server, lambda: len(waits) < 6, lambda: now[0], sleep)  # pyright: ignore[reportArgumentType]
+    run(game, server, lambda: len(waits) < 6, lambda: now[0], sleep)
     assert waits == pytest.approx([1 / RATE] * 6)
     assert game.time == pytest.approx(2 * 6 / RATE, abs=0.016)
     slow = itertools.count()
-    run(game, server, lambda: len(waits) < 7 and next(slow) < 3, lambda: 10.0 * next(slow), sleep)  # pyright: ignore[reportArgumentType]
+    run(game, server, lambda: len(waits) < 7 and next(slow) < 3, lambda: 10.0 * next(slow), sleep)
     assert len(waits) == 6  # behind: nothing to wait for
     assert json.loads(server.news[-1].start)["start"]["able"] == {"push": True, "drop": True, "attach": True}
 
 
+def test_it_waits_for_a_browser():
+    game, server, left = flying(), deaf(), [0]
+    server.watched = False
+    run(game, server, lambda: left.append(0) or len(left) < 9, lambda: 0.0, lambda _: None)
+    assert game.time == 0.0
+    assert server.news[-1].frame
+
+
 def test_memory_does_not_grow():
     game = flying(given={"payload": 0.35, "wind": 1.0})
-    server, left = Deaf(), [0]
+    server, left = deaf(), [0]
 
     def going() -> bool:
         left[0] -= 1
@@ -359,7 +372,7 @@ def test_memory_does_not_grow():
 
     def play(ticks: int) -> int:
         left[0] = ticks
-        run(game, server, going, lambda: 0.0, lambda _: None)  # pyright: ignore[reportArgumentType]
+        run(game, server, going, lambda: 0.0, lambda _: None)
         return tracemalloc.get_traced_memory()[0]
 
     tracemalloc.start()
