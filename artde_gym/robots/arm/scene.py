@@ -1,7 +1,7 @@
 """An arm as replays show it: its boxes, and the path that its tool is meant to take.
 
-A scene's bodies have the orientation of their parents at zero. Where an arm's do not, a body without a shape comes
-between them, turned by a constant angle, which `frame_angles` adds to the joints of a pose.
+A scene's bodies have the orientation of their parents at zero. Between bodies of an arm that have another one comes a
+body without a shape, turned by a constant angle, which `frame_angles` adds to the joints of a pose.
 """
 
 from __future__ import annotations
