@@ -42,8 +42,8 @@ def evaluate(
     scenario: Annotated[
         str | None,
         typer.Option(
-            help="Comma-separated names; see `list`. Default: the environment's main ones; if vectorized, the first; "
-            "custom: the environment as it is."
+            help="Comma-separated names; see `list`. Default: the environment's main ones. custom: the environment as "
+            "it is, the default with --disturbances."
         ),
     ] = None,
     env: Annotated[str | None, typer.Option(help=f"Environment id. Default: the scenarios', or {WALK}.")] = None,
@@ -81,10 +81,8 @@ def evaluate(
         record_hz = trace_hz
     if scenario is None:
         env = WALK if env is None else env
-        scenario = ",".join(main_scenarios(env)) or None
-        if scenario is not None and vectorized:
-            scenario = scenario.split(",")[0]
-    if scenario == CUSTOM:
+        scenario = ",".join(main_scenarios(env)) if disturbances is None else CUSTOM
+    if scenario in (CUSTOM, ""):
         scenario = None
     kwargs = environment_kwargs(env_kwargs, engine)
     folder = folder_of(out)

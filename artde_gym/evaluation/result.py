@@ -63,7 +63,7 @@ class Result:
             first = self.episodes[twice].iloc[0]
             problem = f"of {first['controller']} in {first['scenario']} has two episodes"
             todo = "give each scenario, controller, seed and drawn disturbances once"
-            raise OptionError("seed", first["seed"], todo, problem)
+            raise OptionError("seed", int(first["seed"]), todo, problem)
 
     @property
     def controllers(self) -> list[str]:

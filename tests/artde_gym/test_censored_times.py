@@ -157,7 +157,7 @@ def test_pairs_have_the_same_disturbances() -> None:
 
 def test_an_episode_that_is_there_twice_is_refused() -> None:
     episodes = table({"a": [1, 2]})
-    with pytest.raises(OptionError, match="a in S with the seed 0 twice"):
+    with pytest.raises(OptionError, match="seed 0 of a in S has two episodes"):
         Result(pd.concat([episodes, episodes]))
 
 

@@ -22,7 +22,7 @@ from artde_gym.errors import DisturbanceError, OptionError
 TORQUE = Parameter("torque", "Nm", 0.0, 20.0, None, "largest torque of friction, of each joint")
 SPEED = Parameter("speed", "rad/s", 1e-3, 10.0, 0.1, "at which it is three quarters of that")
 FRICTION = DisturbanceSpec(
-    "joint_friction", "Friction in the joints.", (TORQUE, SPEED), requires="joints", shorthand="torque"
+    "stiction", "Friction in the joints.", (TORQUE, SPEED), requires="joints", shorthand="torque"
 )
 STIFFNESS = Parameter("stiffness", "N/m", 0.0, 100.0, None, "of the tether")
 ANCHOR = Parameter("anchor", "m", -5.0, 5.0, (0.0, 0.0, 0.5), "where it is tied to", size=3)
@@ -31,7 +31,7 @@ TETHER = DisturbanceSpec(
 )
 WALK, FLIGHT = "BipedWalk-Payload-v0", "QuadInfinity-Payload-v0"
 EFFECTS = {
-    WALK: {"joint_friction": {"torque": {"uniform": [0.2, 0.6]}}, "tether": [{"stiffness": 20.0}, {"stiffness": 5.0}]},
+    WALK: {"stiction": {"torque": {"uniform": [0.2, 0.6]}}, "tether": [{"stiffness": 20.0}, {"stiffness": 5.0}]},
     FLIGHT: {"tether": {"stiffness": 2.0, "anchor": [0.0, 0.0, 1.0]}},
 }
 
@@ -79,7 +79,7 @@ def test_many_walk_as_each_alone_to_the_bit(period):
 @pytest.mark.bullet
 def test_friction_takes_energy_in_both_engines():
     for engine in ("bullet", "mujoco"):
-        free, rubbed = (walk(engine=engine, **kinds)[:, 12:24] for kinds in ({}, {"joint_friction": 5.0}))
+        free, rubbed = (walk(engine=engine, **kinds)[:, 12:24] for kinds in ({}, {"stiction": 5.0}))
         assert np.abs(rubbed).sum() < 0.7 * np.abs(free).sum()
 
 
@@ -91,7 +91,7 @@ def test_both_engines_pull_a_base_alike():
 
 
 def test_nothing_is_nothing_to_the_bit():
-    np.testing.assert_array_equal(walk(joint_friction=0.0), walk())
+    np.testing.assert_array_equal(walk(stiction=0.0), walk())
 
 
 @pytest.mark.bullet
@@ -118,7 +118,7 @@ def test_a_copy_goes_on_alike(duplicate):
 
 
 def test_the_same_is_drawn_whichever_kind_was_registered_first():
-    given = {"tether": {"stiffness": {"uniform": [0, 9]}}, "joint_friction": {"uniform": [0, 9]}, "friction": 0.5}
+    given = {"tether": {"stiffness": {"uniform": [0, 9]}}, "stiction": {"uniform": [0, 9]}, "friction": 0.5}
     drawn = [Disturbances.parse(given, (), ()).sample(np.random.default_rng(1))]
     DISTURBANCES._entries["tether"] = DISTURBANCES._entries.pop("tether")
     drawn.append(Disturbances.parse(given, (), ()).sample(np.random.default_rng(1)))
@@ -127,17 +127,17 @@ def test_the_same_is_drawn_whichever_kind_was_registered_first():
 
 def test_a_robot_without_the_capability_refuses():
     with pytest.raises(DisturbanceError, match="q450"):
-        gym.make(FLIGHT, disturbances={"joint_friction": 1.0})
+        gym.make(FLIGHT, disturbances={"stiction": 1.0})
 
 
 def test_what_an_effect_gives_is_checked():
     register_disturbance(FRICTION, lambda values, states: Load(tau=states.qd[:, :3]), replace=True)
-    with pytest.raises(DisturbanceError, match=r"tau of the effect of 'joint_friction'.*\(1, 3\).*\(1, 12\)"):
-        walk(joint_friction=1.0)
+    with pytest.raises(DisturbanceError, match=r"tau of the effect of 'stiction'.*\(1, 3\).*\(1, 12\)"):
+        walk(stiction=1.0)
     nothing: Any = None
     register_disturbance(FRICTION, lambda values, states: nothing, replace=True)
     with pytest.raises(DisturbanceError, match="a Load"):
-        walk(joint_friction=1.0)
+        walk(stiction=1.0)
 
 
 def test_a_name_is_taken_once():

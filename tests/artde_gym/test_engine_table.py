@@ -61,7 +61,7 @@ def test_an_unknown_one_is_refused_with_those_that_there_are() -> None:
 
 def test_batches_are_of_engines_that_have_them() -> None:
     env: Any = gym.make("BipedWalk-Payload-v0", engine="mujoco", duration=0.2)
-    with pytest.raises(OptionError, match="'mujoco'; engine 'mine' has no batches"):
+    with pytest.raises(OptionError, match="engine is 'mine'; allowed: 'mujoco'; single environments"):
         make_batch("mine", env.unwrapped.nominal_robot, 2, 0.001, 1)
 
 

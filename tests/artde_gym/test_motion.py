@@ -145,7 +145,7 @@ def test_a_result_shows_itself(flights):
     shown = result.replay(controllers=["tde"])._repr_html_()
     assert shown.startswith('<iframe sandbox="allow-scripts"')
     assert shown.count("<") == 2  # the page is an attribute of the frame
-    with pytest.raises(OptionError, match="stored"):
+    with pytest.raises(OptionError, match="folder None holds no result; store with"):
         Result(result.episodes).replay()
 
 

@@ -127,7 +127,7 @@ def test_a_killed_training_continues_from_its_last_checkpoint(tmp_path):
 def test_a_folder_belongs_to_one_configuration(tmp_path, quick):
     train(small(steps=1), tmp_path)
     Run(small(steps=7, patience=3, workers=2), tmp_path)  # the same episodes, wherever and however long
-    with pytest.raises(TrainingError, match="seed of the run in"):
+    with pytest.raises(TrainingError, match="seed 4 differs from 0 of the run in"):
         Run(small(seed=4), tmp_path)
     with pytest.raises(TrainingError, match=r"algo is 'pqo'; allowed: cma-es, ppo, sac \(did you mean 'ppo'"):
         small("pqo")
