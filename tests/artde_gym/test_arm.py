@@ -160,6 +160,7 @@ def test_friction_takes_energy_and_scales():
     assert (np.abs(task.friction(1.0, 100 * qd)) <= task.coulomb).all()
 
 
+@pytest.mark.bullet
 def test_both_engines_walk_one_path():
     paths = []
     for engine in ("mujoco", "bullet"):

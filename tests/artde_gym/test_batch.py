@@ -222,17 +222,17 @@ def test_an_environment_without_a_vector_is_refused(monkeypatch: pytest.MonkeyPa
         evaluate(["tde"], "Alone-v0", episodes=1, vectorized=True)
 
 
-@pytest.mark.parametrize(("vectorized", "scenarios"), [(False, ["Q1", "Q1-calm", "Q1-gale"]), (True, ["Q1"])])
-def test_command_prints_table_31_beside_ours(vectorized: bool, scenarios: list[str], tmp_path: Path) -> None:
+@pytest.mark.parametrize("vectorized", [False, True])
+def test_command_prints_table_31_beside_ours(vectorized: bool, tmp_path: Path) -> None:
     arguments = ["evaluate", "--env", QUADROTOR, "--controllers", "tde,atde,artde,asmc", *["--vectorized"] * vectorized]
     arguments += ["--episodes", "2", "--workers", "1", "--out", str(tmp_path / "run")]
     outcome = CliRunner().invoke(app, [*arguments, "--env-kwargs", json.dumps({"duration": 0.6})])
     assert outcome.exit_code == 0, outcome.output
     for word in ("Q1: infinity", "Table 3.1", "RMS error (m)", "15.320", "psi", "all"):
         assert word in outcome.output
-    assert outcome.output.count("Table 3.1") == len(set(scenarios) - {"Q1-calm"})  # there was a fan in the thesis
+    assert outcome.output.count("Table 3.1") == 2  # not in Q1-calm: there was a fan in the thesis
     folder = tmp_path / "run"
     assert json.loads((folder / "summary.json").read_text())["configuration"]["vectorized"] == vectorized
     table = pd.read_csv(folder / "episodes.csv")
-    assert table["scenario"].unique().tolist() == scenarios
-    assert len(table) == 2 * 4 * len(scenarios)
+    assert table["scenario"].unique().tolist() == ["Q1", "Q1-calm", "Q1-gale"]
+    assert len(table) == 2 * 4 * 3
