@@ -22,6 +22,8 @@ from artde_gym.studies import frontier, sweep, tune
 from controllers import GainError
 from tests.mutations import copied, mutate
 
+pytestmark = pytest.mark.once
+
 TRIES = int(os.environ.get("EXAMPLES", "24"))
 """How many times each reader gets something damaged; `make soak` sets it."""
 REFUSED = (ArtdeGymError, GainError, gym.error.Error, IsADirectoryError)

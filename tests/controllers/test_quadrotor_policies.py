@@ -15,6 +15,8 @@ from artde_gym.info import fall_reason
 from artde_gym.robots.q450.task import OBSERVATION
 from controllers.laws.errors import GainError
 
+pytestmark = pytest.mark.once
+
 ID = "QuadInfinity-Payload-v0"
 LAWS = ["tde", "atde", "artde", "artde-robust", "tde+c", "tde+kd", "pid", "asmc", "geometric", "indi"]
 
