@@ -245,9 +245,10 @@ def outlasts(names: Sequence[str]) -> Callable[[Frontier], Verdict]:
             f"{first} beyond {second} by {_gap(gap)} {found.axis.unit}"
             for (first, second), gap in zip(itertools.pairwise(names), gaps, strict=True)
         )
-        if all(sign * gap.value > 0 and min(sign * gap.low, sign * gap.high) > 0 for gap in gaps):
+        # an end of 0 counts: half points lie inside their brackets, and brackets that share only a level differ
+        if all(sign * gap.value > 0 and min(sign * gap.low, sign * gap.high) >= 0 for gap in gaps):
             return Verdict("holds", measured)
-        reversed_ = any(sign * gap.value < 0 and max(sign * gap.low, sign * gap.high) < 0 for gap in gaps)
+        reversed_ = any(sign * gap.value < 0 and max(sign * gap.low, sign * gap.high) <= 0 for gap in gaps)
         return Verdict("does not hold" if reversed_ else "undecided", measured)
 
     return judge
