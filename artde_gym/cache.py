@@ -38,17 +38,16 @@ def cached(kind: str, key: Mapping[str, Any], modules: tuple[str, ...], compute:
         modules: source files that compute it.
         compute: computes the array.
     """
+    file = None
     with contextlib.suppress(OSError, ValueError):  # sources may be missing, a file damaged
         name = _hash(json.dumps([_software(modules), key], sort_keys=True).encode()).hex()
         file = folder() / f"{kind}-{name[:32]}.npy"
-        try:
-            return _read(file)
-        except (OSError, ValueError):
-            found = compute()
-            with contextlib.suppress(Exception):  # a full disk, a home that is read-only, ...
-                _write(file, found)
-            return found
-    return compute()
+        return _read(file)
+    found = compute()
+    if file is not None:
+        with contextlib.suppress(Exception):  # a full disk, a home that is read-only, ...
+            _write(file, found)
+    return found
 
 
 def folder() -> Path:

@@ -105,7 +105,7 @@ class Game:
         return all(player.over for player in self.players)
 
     def frame(self) -> bytes:
-        """Return time, and what `Player.frame` has of each player, as float32."""
+        """Return the time and the frame of each player (`Player.frame`) as float32."""
         return np.concatenate([[self.time], *(player.frame() for player in self.players)], dtype=np.float32).tobytes()
 
     @property
@@ -277,7 +277,7 @@ class Game:
 
 
 _METHODS = {"push": "push", "drop": "drop_payload", "attach": "add_payload"}
-"""What a person can do -> the environment's method that does it."""
+"""Action of a person -> method of the environment that carries it out."""
 
 ORDERS: dict[str, Callable[[Game, Mapping[str, Any]], None]] = {
     "push": Game._push,

@@ -13,8 +13,6 @@ from artde_gym.multibody.spec import Vector
 
 FIELD_OF_VIEW = 40.0  # degrees, vertical
 NEAR = 0.05  # m, distance of the near clipping plane
-WITHOUT_WINDOW = "use `artde-gym video`, which needs no display"
-"""What to do where no window can be opened."""
 
 
 class Camera(NamedTuple):
