@@ -25,8 +25,14 @@ PERIOD, DURATION = 0.02, 12.0  # s, of the path
 def scene(kwargs: Mapping[str, Any], env_id: str | None = None) -> Scene:
     """Return the scene of an arm with these arguments of the environment, whatever its id."""
     del env_id
-    arm = [kwargs.get("robot", "panda"), kwargs.get("tip"), kwargs.get("armature")]
-    task = Tracking.of(*arm, kwargs.get("reference", PICK), PERIOD, kwargs.get("duration", DURATION))
+    task = Tracking.of(
+        kwargs.get("robot", "panda"),
+        kwargs.get("tip"),
+        kwargs.get("armature"),
+        kwargs.get("reference", PICK),
+        PERIOD,
+        kwargs.get("duration", DURATION),
+    )
     spec = task.nominal_robot
     bodies, number = _bodies(spec)
     sites = {name: Point(number[link], place) for name, link, place in spec.sites}
