@@ -8,7 +8,8 @@ ARGS ?=
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --disable-pip-version-check --quiet
 INSTALL := $(PIP) --constraint constraints.txt
-TESTS = OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal --at-least $(LEAST)
+# three for two cores: some tests wait for a clock or a browser
+TESTS = OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist worksteal --at-least $(LEAST)
 # packages of CUDA, which no constraint is needed for, since CPU builds of PyTorch do not ask for them
 CUDA := ^(cuda|nvidia)-|^triton=
 

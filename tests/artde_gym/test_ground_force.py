@@ -16,6 +16,8 @@ from artde_gym.errors import DisturbanceError, UnknownNameError
 from artde_gym.robots.ojas.model import TOTAL_MASS, ojas
 from artde_gym.scenarios import SCENARIOS, scenario
 
+pytestmark = pytest.mark.once
+
 ID = "BipedWalk-Payload-v0"
 DT = 0.001  # s, of the physics
 SWING = round(AIRBORNE / DT)
