@@ -17,7 +17,7 @@ from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.html import Cell, figure, table
 from artde_gym.studies.frontier.axis import Axis as Varied
 from artde_gym.studies.frontier.half import half_text
-from artde_gym.studies.frontier.result import RECORD, Frontier, value_text
+from artde_gym.studies.frontier.result import RECORD, Frontier, direction_note, value_text
 
 Rows = list[dict[Any, Any]]
 
@@ -46,6 +46,10 @@ def answer(found: Frontier) -> tuple[str, list[str]]:
     axis, rows = found.axis, _records(found.table)
     known = [row for row in rows if math.isfinite(row["frontier"]) and row["relation"] in ("=", ">=", "<=")]
     lines = [_sentence(row, found) for row in rows]
+    if note := direction_note(found):
+        lines.append(note)
+    if not known and note:
+        return f"No controller survives the easiest level of {axis.path}.", lines
     if not known:
         return f"No controller survives {axis.path} at any level that was tried.", lines
     sign = 1 if axis.harder == "larger" else -1

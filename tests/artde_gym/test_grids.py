@@ -20,8 +20,9 @@ from artde_gym.evaluation.statistics import rate
 from artde_gym.evaluation.tasks import Update
 from artde_gym.report import frontier_page
 from artde_gym.studies import Frontier, frontier
-from artde_gym.studies.frontier.axis import Axis
+from artde_gym.studies.frontier.axis import Axis, Harder
 from artde_gym.studies.frontier.half import half_difference, half_point, half_text
+from artde_gym.studies.frontier.result import direction_note
 from artde_gym.studies.frontier.standard import standard_test
 from artde_gym.studies.frontier.table import frontier_of
 from artde_gym.studies.reproduce.claims import outlasts
@@ -77,6 +78,37 @@ def test_smaller_is_harder() -> None:
 def test_survival_that_rises_again_is_levelled() -> None:
     """1, 0, 1, 0 becomes 1, 1/2, 1/2, 0, which stays at one half from 22 to 24 N."""
     assert half_point([[1.0, 0.0, 1.0, 0.0]] * 4, [20.0, 22.0, 24.0, 26.0])[:3] == (23.0, 20.0, 26.0)
+
+
+def test_survival_that_rises_to_the_hardest_level_has_no_half_point() -> None:
+    """With the wrong end as the harder one, 0, 0, 1, 1 would read as "survives everything"."""
+    wrong, right = [[0.0, 0.0, 1.0, 1.0]] * 5, [[1.0, 1.0, 0.0, 0.0]] * 5
+    grid = [0.03, 0.05, 0.07, 0.09]
+    estimate = half_point(wrong, grid)
+    assert np.isnan(estimate[:3]).all()
+    assert np.isnan(half_difference(right, wrong, grid)[:3]).all()
+    row = dict(zip(("half", "low", "high"), estimate[:3], strict=True))
+    assert half_text(row, Axis("gains", "m_bar", "kg m^2", 0.03, 0.09, 0.02, "larger")) == "none, since survival rises"
+    assert half_point(right, grid[::-1]).value == pytest.approx(0.06)
+
+
+@pytest.mark.parametrize(("harder", "asked"), [("larger", "--harder smaller"), ("smaller", "")])
+def test_a_hardest_level_that_is_survived_more_often_raises_a_question(harder: Harder, asked: str) -> None:
+    varied = Axis("gains", "m_bar", "kg m^2", 0.03, 0.05, 0.02, harder)
+    rows: list[dict[str, Any]] = [
+        {
+            "value": value,
+            "controller": "tde",
+            "episodes": 5,
+            "survived": 5 * rate,
+            "rate": rate,
+            "low": 0.0,
+            "high": 1.0,
+        }
+        for value, rate in [(0.03, 0.0), (0.05, 1.0)]
+    ]
+    assert asked in (note := direction_note(frontier_of(varied, ["tde"], rows, 0.9, None, True)))
+    assert bool(note) == bool(asked)
 
 
 def test_episodes_that_were_not_run_count_for_nothing() -> None:
@@ -249,7 +281,7 @@ def test_gains_are_varied(tmp_path: Path) -> None:
     assert record["configuration"]["gains"] == {"tde": {"m_bar": 0.04}, "pid": {"m_bar": 0.04}}
     assert whole.axis.unit == "kg m^2"
     found = frontier(["tde"], PUSH, "gains.m_bar", tolerance=0.02, **options)
-    assert found.table["relation"].tolist() == [">="]
+    assert found.table["relation"].tolist() == ["<="]
     with pytest.raises(GainError, match="gamma"):
         frontier(["tde"], PUSH, "gains.gamma", tolerance=0.01, **options)
 

@@ -91,7 +91,7 @@ _FRONTIER = FrontierTest(
         "mass_scale.factor": Range(1.0, 2.0, 0.05),
         "control_period": Range(0.001, 0.02, 0.001),
         "speed": Range(0.0, 0.25, 0.01),
-        "gains.m_bar": Range(0.03, 0.09, 0.006),
+        "gains.m_bar": Range(0.03, 0.09, 0.006, "smaller"),
     },
 )
 

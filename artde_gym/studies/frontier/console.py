@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from artde_gym.studies.frontier.half import half_text
-from artde_gym.studies.frontier.result import Frontier, value_text
+from artde_gym.studies.frontier.result import Frontier, direction_note, value_text
 
 
 def print_frontier(found: Frontier, console: Console) -> None:
@@ -32,6 +32,8 @@ def print_frontier(found: Frontier, console: Console) -> None:
         )
         console.print(Text(note, style="dim"))
         console.print(_table(found))
+        if note := direction_note(found):
+            console.print(note)
         if found.half is not None:
             _print_grid(found, console)
     if not found.complete:
@@ -65,7 +67,8 @@ def _print_grid(found: Frontier, console: Console) -> None:
         "Half of the episodes end without a fall at (95 % interval: bootstrap over seeds, no narrower than the grid):"
     )
     for row in found.half.to_dict(orient="records"):
-        console.print(f"  {row['controller']}: {half_text(row, found.axis)}{unit}")
+        number = "" if math.isnan(row["half"]) else unit
+        console.print(f"  {row['controller']}: {half_text(row, found.axis)}{number}")
 
 
 def _falls(row: dict[Any, Any] | None) -> str:

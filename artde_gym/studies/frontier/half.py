@@ -35,10 +35,14 @@ def half_point(survived: ArrayLike, grid: Sequence[float]) -> Estimate:
 
     Returns:
         The value and its interval. Infinite, in the direction that is harder, where more than half survive the hardest
-        level; in the other one where not even half survive the easiest.
+        level; in the other one where not even half survive the easiest. NaN where half survive the hardest level but
+        not the easiest one: then survival rises where it should fall.
     """
     table = np.asarray(survived, dtype=np.float64)
-    value = _crossing(np.nanmean(table, axis=0), grid)[0]
+    rates = np.nanmean(table, axis=0)
+    if rates[0] < HALF < rates[-1]:
+        return Estimate(math.nan, math.nan, math.nan, len(table))
+    value = _crossing(rates, grid)[0]
     brackets = _brackets(table, grid)
     return Estimate(value, *_interval(brackets[:, 0], brackets[:, 1]), len(table))
 
@@ -50,7 +54,9 @@ def half_difference(first: ArrayLike, second: ArrayLike, grid: Sequence[float]) 
     where the grid does not reach far enough.
     """
     tables = [np.asarray(table, dtype=np.float64) for table in (first, second)]
-    values = [_crossing(np.nanmean(table, axis=0), grid)[0] for table in tables]
+    values = [half_point(table, grid).value for table in tables]
+    if np.isnan(values).any():
+        return Estimate(math.nan, math.nan, math.nan, len(tables[0]))
     (low, high), (other_low, other_high) = (_brackets(table, grid).T for table in tables)
     with np.errstate(invalid="ignore"):
         value = values[0] - values[1] if values[0] != values[1] else 0.0
@@ -80,6 +86,8 @@ def half_points(found: Frontier) -> pd.DataFrame:
 
 def half_text(row: dict[Any, Any], varied: Axis) -> str:
     """Write a half point with its interval: "37.0 (36..38)", "> 60" where it lies beyond the grid."""
+    if math.isnan(row["half"]):
+        return "none, since survival rises"
     beyond = {math.inf: f"> {varied.high:g}", -math.inf: f"< {varied.low:g}"}
     value = beyond.get(row["half"]) or f"{row['half']:.3g}"
     if row["low"] == row["high"]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -50,3 +51,21 @@ def value_text(row: Mapping[Any, Any], unit: str) -> str:
         return "open"
     relation = "" if row["relation"] == "=" else f"{row['relation']} "
     return f"{relation}{row['frontier']:g}{'' if unit == '1' else f' {unit}'}"
+
+
+def direction_note(found: Frontier) -> str:
+    """Say which controllers survive the hardest level more often than the easiest one; "" if none does."""
+    rates = found.levels.set_index(["controller", "value"])["rate"]
+    easiest, hardest = found.axis.levels[0], found.axis.levels[-1]
+    rising = [
+        str(name)
+        for name in found.table["controller"]
+        if rates.get((name, hardest), math.nan) > rates.get((name, easiest), math.nan)
+    ]
+    if not rising:
+        return ""
+    other = "smaller" if found.axis.harder == "larger" else "larger"
+    return (
+        f"More survive the hardest level than the easiest one under {', '.join(rising)}: are {other} values the harder "
+        f"ones (--harder {other})?"
+    )
