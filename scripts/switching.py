@@ -23,7 +23,6 @@ import gymnasium as gym
 import numpy as np
 import pandas as pd
 
-import artde_gym  # noqa: F401  (registers the environments)
 import controllers
 from artde_gym.evaluation import statistics
 from artde_gym.evaluation.seeds import episode_seed

@@ -8,7 +8,6 @@ from typing import Any
 
 import gymnasium as gym
 
-import artde_gym  # noqa: F401  # registers the environments
 from artde_gym.doctor.check_result import CheckResult
 from artde_gym.registration import make_controller
 from artde_gym.sim.factory import installed_engines

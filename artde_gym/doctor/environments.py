@@ -13,7 +13,6 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.utils.env_checker import check_env
 
-import artde_gym  # noqa: F401  # registers the environments
 from artde_gym.disturbances import DISTURBANCES
 from artde_gym.doctor.check_result import CheckResult
 from artde_gym.evaluation.environments import arguments_of, ours, robot_of, vector

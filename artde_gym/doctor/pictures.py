@@ -10,7 +10,6 @@ from typing import Any
 
 import gymnasium as gym
 
-import artde_gym  # noqa: F401  # registers the environments
 from artde_gym.doctor.check_result import CheckResult
 from artde_gym.errors import MissingDependencyError, OptionError
 from artde_gym.sim.factory import ENGINES

@@ -11,7 +11,6 @@ from typing import Any
 import gymnasium as gym
 from gymnasium.envs.registration import load_env_creator
 
-import artde_gym  # noqa: F401  # registers the environments
 from artde_gym.evaluation.environments import ours, robot_of
 from artde_gym.registration import registered_controllers
 from artde_gym.scenarios import SCENARIOS

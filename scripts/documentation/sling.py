@@ -7,7 +7,6 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-import artde_gym  # noqa: F401  # registers the environments
 import controllers
 from artde_gym.arrays import Array
 from artde_gym.palette import styles

@@ -11,7 +11,6 @@ import pytest
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode
 
-import artde_gym  # noqa: F401  (registers the environments)
 import controllers
 from artde_gym.envs.biped_push import BipedPushVectorEnv
 from artde_gym.errors import ActionError, ArtdeGymError, OptionError

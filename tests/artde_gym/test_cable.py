@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from scipy.special import ellipk
 
-import artde_gym  # noqa: F401  (registers the environments)
 import controllers
 from artde_gym.disturbances import Disturbances
 from artde_gym.errors import DisturbanceError, RobotError

@@ -9,7 +9,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-import artde_gym  # noqa: F401  # registers the environments
 from artde_gym.sim.factory import EngineName
 
 BIPED: dict[str, Any] = {

@@ -14,7 +14,6 @@ import pytest
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
 
-import artde_gym  # noqa: F401  (registers the environments)
 import controllers
 from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.ground import AIRBORNE, GrfPulses

@@ -8,7 +8,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-import artde_gym  # noqa: F401  (registers the environments)
 import controllers
 from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.ground import AIRBORNE, GrfPulses

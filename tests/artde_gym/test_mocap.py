@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-import artde_gym  # noqa: F401  (registers the environments)
 from artde_gym.disturbances import mocap
 from artde_gym.disturbances.mocap import Mocap, tracking_gains
 

@@ -20,7 +20,6 @@ import pytest
 from scipy.stats import binomtest
 from typer.testing import CliRunner
 
-import artde_gym  # noqa: F401  (registers the environments)
 import controllers
 from artde_gym.cli import app
 from artde_gym.errors import ArtdeGymError, MissingDependencyError, OptionError, StoreError, UnknownNameError

@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-import artde_gym  # noqa: F401  # registers the environments
 import controllers
 from artde_gym.evaluation import Result, statistics
 from artde_gym.evaluation.environments import fastest_engine

@@ -10,7 +10,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-import artde_gym  # noqa: F401  (registers the environments)
 import controllers
 from artde_gym.errors import DisturbanceError
 from artde_gym.multibody.dynamics import RigidBodyTree

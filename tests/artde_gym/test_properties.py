@@ -17,7 +17,6 @@ from gymnasium.envs.registration import load_env_creator
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-import artde_gym  # noqa: F401  # registers the environments
 from artde_gym.disturbances import DISTURBANCES
 from artde_gym.errors import ArtdeGymError
 from artde_gym.sim.engine_loops import open_clients

@@ -13,7 +13,6 @@ import pytest
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
 
-import artde_gym  # noqa: F401  (registers the environments)
 from artde_gym.disturbances.schedule import EVENTS
 from artde_gym.errors import ActionError, ArtdeGymError, DisturbanceError, OptionError, UnknownNameError
 from artde_gym.info import fall_reason

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-import artde_gym  # noqa: F401  (registers the environments)
 from artde_gym.disturbances.ground_effect import thrust_gain
 from artde_gym.disturbances.schedule import EVENTS
 from artde_gym.robots.q450 import model as q450

@@ -4,7 +4,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-import artde_gym  # noqa: F401  # registers the environments
 from artde_gym.robots.ojas.model import ojas
 from artde_gym.sim.factory import make_engine
 

@@ -15,7 +15,6 @@ from gymnasium.wrappers import RecordVideo
 from PIL import Image
 from typer.testing import CliRunner
 
-import artde_gym  # noqa: F401  (registers the environments)
 import controllers
 from artde_gym.cli import app
 from artde_gym.errors import OptionError, UnknownNameError

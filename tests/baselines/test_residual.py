@@ -6,7 +6,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-import artde_gym  # noqa: F401  # registers the environments
 import controllers
 from artde_gym.errors import ActionError, OptionError
 from artde_gym.registration import registered_controllers

@@ -17,7 +17,6 @@ from scipy import stats
 from stable_baselines3.common.env_checker import check_env
 from stable_baselines3.common.vec_env import VecMonitor
 
-import artde_gym  # noqa: F401  # registers the environments
 from artde_gym.errors import OptionError
 from artde_gym.report import write_report
 from baselines.errors import TrainingError

@@ -7,7 +7,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-import artde_gym  # noqa: F401  # registers the environments
 from baselines.balance import GAINS, balance_network
 from baselines.errors import TrainingError
 from baselines.residual import Residual

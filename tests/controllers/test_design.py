@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-import artde_gym  # noqa: F401  (registers the environments)
 from artde_gym.cli import app
 from artde_gym.errors import ArtdeGymError
 from controllers import GainError

@@ -9,7 +9,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-import artde_gym  # noqa: F401  # registers the environments
 import controllers
 from artde_gym.info import fall_reason
 from controllers import GainError

@@ -4,7 +4,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-import artde_gym  # noqa: F401  # registers the environment
 import controllers
 from artde_gym.robots.ojas.task import OBSERVATION
 

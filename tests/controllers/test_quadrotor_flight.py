@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-import artde_gym  # noqa: F401  # registers the environment
 import controllers
 from artde_gym.robots.q450 import model as q450
 from controllers.law_table import LAWS, Nothing

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-import artde_gym  # noqa: F401  # registers the environment
 import controllers
 from artde_gym.errors import UnknownNameError
 from artde_gym.info import fall_reason

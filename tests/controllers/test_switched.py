@@ -12,7 +12,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import artde_gym  # noqa: F401  (registers the environments)
 import controllers
 from artde_gym.errors import OptionError
 from artde_gym.evaluation.seeds import episode_seed

@@ -9,7 +9,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-import artde_gym  # noqa: F401  (registers the environments)
 import controllers
 from controllers import GainError
 from controllers.laws.tde import TdeGains, tde, tde_init
