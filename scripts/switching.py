@@ -212,6 +212,7 @@ def ratio(by_law: Mapping[str, pd.DataFrame], rival: str, column: str) -> str:
 def lying(kind: str, contact: slice) -> Callable[[Any], Any]:
     """Return a function that falsifies the contact flags in observations, one after the other."""
     before: list[Any] = []
+    coins = np.random.default_rng(SEED)
     sides = {"left": [contact.start], "both": [contact.start, contact.start + 1]}
 
     def change(observation: Any) -> Any:
@@ -222,6 +223,10 @@ def lying(kind: str, contact: slice) -> Callable[[Any], Any]:
             observation[:, contact] = before[max(0, len(before) - 1 - int(rest))]
         elif word in sides:
             observation[:, sides[word]] = 1.0 if rest == "on" else 0.0
+        elif word == "swapped":
+            observation[:, contact] = observation[:, contact][:, ::-1]
+        elif word == "random":
+            observation[:, contact] = coins.integers(0, 2, observation[:, contact].shape)
         return observation
 
     return change
@@ -234,6 +239,8 @@ LIES = {
     "both always on": "both on",
     "12 ms late": "late 3",
     "20 ms late": "late 5",
+    "left and right swapped": "swapped",
+    "a coin for each foot and sample": "random",
 }
 
 
