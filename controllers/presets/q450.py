@@ -68,8 +68,8 @@ _TUNED = (
 
 _TUNED_SLUNG = (
     "ours: `artde-gym tune --scenario Q-sling --controllers geometric-load,tde+swing --metric rms_load_error_m "
-    "--vectorized`, 50 trials of 4 flights for each of the two; best there, with 0.35 kg on 0.5 m, and lost on other "
-    "cables, where the default is not"
+    "--vectorized`, 50 trials of 4 flights for each of the two; best there, with 0.35 kg on 0.5 m; with other loads it "
+    "crashes, where the default does not"
 )
 
 _SLUNG_M_BAR = 1.6  # kg, nearer to the mass of vehicle and load together
