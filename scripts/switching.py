@@ -181,7 +181,7 @@ def tables(folder: Path) -> str:
 
 def table(title: str, heads: Sequence[str], rows: Mapping[str, Sequence[str]]) -> str:
     lines = [f"| {title} | " + " | ".join(heads) + " |", "|---|" + "---|" * len(heads)]
-    return "\n".join(lines + [f"| {name} | " + " | ".join(cells) + " |" for name, cells in rows.items()])
+    return "\n".join(lines + [f"| {name} | " + " | ".join(cells) + " |" for name, cells in rows.items() if any(cells)])
 
 
 def walked(rows: pd.DataFrame) -> pd.DataFrame:
