@@ -1,7 +1,7 @@
 """The walks behind docs/laws/switched.md: laws that switch with the support phase against laws that do not.
 
 python scripts/switching.py held-out   gaits, frictions and payloads by which nothing was chosen; S1 to S3, 1 and 4 ms,
-                                       without and with the ground force
+                                       without and with the ground force, under TDE, ATDE and ARTDE
 python scripts/switching.py tables     the tables of what there is of that
 python scripts/switching.py flags      S1-L4 and S2-L4 with contact flags that lie
 python scripts/switching.py cost       computing time of a call
@@ -48,7 +48,7 @@ TOUCHDOWN, UNLOADED = 0.06, 0.2  # s after a landing, s of no load before it
 _SWITCHED = DRIVES["ojas"].presets["tde-switched", "support"].gains
 _LEFT, _BOTH, _RIGHT = _SWITCHED.matrices(12, np.float64)
 MEAN = (0.405 * (_LEFT + _RIGHT) + 0.19 * _BOTH).tolist()  # the same matrices, each for its share of the time
-BASES = ("tde", "artde", "atde")
+BASES = ("tde", "atde", "artde")
 LAWS: dict[str, tuple[str, dict[str, Any]]] = {
     f"{law.upper()}, {text}": (name.format(law), gains)
     for law in BASES
@@ -165,9 +165,9 @@ def tables(folder: Path) -> str:
         if len(chosen):
             by_law = {law: chosen[chosen["law"] == law].set_index("world").sort_index() for law in LAWS}
             cases[f"{name}, {ms} ms, {share} %"] = by_law
-    text = [
-        table("falls", list(LAWS), {case: [falls(rows) for rows in by_law.values()] for case, by_law in cases.items()})
-    ]
+    title = "falls at " + ", ".join(law.partition(", ")[2] for law in forms(BASES[0]))
+    laws = [base.upper() for base in BASES]
+    text = [table(title, laws, {case: [falls(by_law, base) for base in BASES] for case, by_law in cases.items()})]
     rivals = [law for law in LAWS if not law.endswith("switched")]
     for column, (title, _, _) in COLUMNS.items():
         rows = {case: [ratio(by_law, rival, column) for rival in rivals] for case, by_law in cases.items()}
@@ -188,8 +188,11 @@ def walked(rows: pd.DataFrame) -> pd.DataFrame:
     return rows.loc[~rows["fell"].astype(bool).to_numpy()]
 
 
-def falls(rows: pd.DataFrame) -> str:
-    return f"{len(rows) - len(walked(rows))}/{len(rows)}" if len(rows) else ""
+def falls(by_law: Mapping[str, pd.DataFrame], base: str) -> str:
+    """Return the falls under each form of a law."""
+    rows = [by_law[law] for law in forms(base)]
+    counts = ", ".join(str(len(one) - len(walked(one))) for one in rows)
+    return f"{counts} of {len(rows[0])}" if len(rows[0]) else ""
 
 
 def means(rows: pd.DataFrame) -> str:
