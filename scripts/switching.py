@@ -29,6 +29,7 @@ from artde_gym.evaluation import statistics
 from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.evaluation.side_by_side import SideBySide
 from artde_gym.evaluation.vector_rollout import run_vector
+from artde_gym.files import write_atomically
 from artde_gym.robots.ojas.task import OBSERVATION
 from artde_gym.scenarios import SCENARIOS
 from controllers.drive import DRIVES
@@ -152,7 +153,8 @@ def held_out(folder: Path) -> None:
         for base in BASES:
             file = folder / f"held-out-{ms}ms-{share}-{gait}-{base}.csv"
             if not file.exists():
-                part(ms, share, gait, base).to_csv(file, index=False)
+                text = part(ms, share, gait, base).to_csv(index=False).encode()
+                write_atomically(file, lambda out, text=text: out.write(text))
     print(tables(folder))
 
 
