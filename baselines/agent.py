@@ -31,6 +31,7 @@ class Agent:
         balanced: channels for which the linear balance law (`cma-es`) has gains.
         observation, action: layouts of its environments, by which saved policies are read without one; without them,
             the environment of the training is built.
+        observations: layouts of environments that observe more, by id.
         nominal: name in a policy's file -> builds the nominal robot.
         nominal_name: arguments of an environment -> name of its nominal robot in a policy's file.
     """
@@ -43,6 +44,7 @@ class Agent:
     balanced: frozenset[str] = frozenset()
     observation: Layout | None = None
     action: Layout | None = None
+    observations: Mapping[str, Layout] = dataclasses.field(default_factory=dict)
     nominal: Mapping[str, Callable[[], Any]] = dataclasses.field(default_factory=dict)
     nominal_name: Callable[[Mapping[str, Any]], str] | None = None
 

@@ -3,6 +3,8 @@
 Channel "attitude": du_q = TURNING limit x [roll, pitch, yaw] (rad/s^2, body axes) in the attitude loop, which at the
 thesis' gains is the slow one. Channel "position": du_p = limit x [x, y, z] (m/s^2, world axes) in the position loop,
 which alone has little to gain. Channel "cascade": both.
+
+In an environment with a cable the agent sees it, and is rewarded for the load's errors in place of the vehicle's.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from artde_gym.layout import Field, Layout
-from artde_gym.robots.q450 import task
+from artde_gym.robots.q450 import sling, task
 from artde_gym.robots.q450.model import q450
 from baselines.agent import Agent
 from baselines.q450_tasks import TASKS
@@ -31,6 +33,9 @@ PASSED_ON = (
     "jerk_ref",
     "wrench_applied",
     "rotor_thrust",
+    "cable",
+    "cable_rate",
+    "cable_held",
 )
 """Fields of the observation that the agent sees as they are."""
 SCALES = {"position": 0.02, "velocity": 0.05, "attitude": 0.01, "turning": 0.1}  # m, m/s, rad, rad/s
@@ -84,6 +89,7 @@ class Q450Adapter:
         loop: Any = getattr(gains, "position", None)
         self._gains = (loop.k_p, loop.k_d) if hasattr(loop, "k_p") else None
         self._at = interface.observation.slices
+        self._slung = "cable" in self._at
         own = [field for field in interface.observation.fields if field.name in PASSED_ON]
         self.features = Layout(
             (
@@ -136,7 +142,7 @@ class Q450Adapter:
         return (np.concatenate([np.zeros(du.shape, du.dtype), du], axis=-1) if self._attitude_alone else du), state
 
     def reward_terms(self, observation: Array, state: Q450AdapterState, fell: Any) -> dict[str, Array]:
-        e, ed = self._errors(observation)
+        e, ed = self._goal_errors(observation)
         action = state.action
         errors = dict(zip(SCALES, (e, ed, state.e_q, state.e_w), strict=True))
         return {
@@ -153,6 +159,15 @@ class Q450Adapter:
             observation[..., at["velocity_ref"]] - observation[..., at["velocity"]],
         )
 
+    def _goal_errors(self, observation: Array) -> tuple[Array, Array]:
+        """Return e and ed of the load where one hangs, but for the hook's place, else of the vehicle."""
+        e, ed = self._errors(observation)
+        if not self._slung:
+            return e, ed
+        r, rate = observation[..., self._at["cable"]], observation[..., self._at["cable_rate"]]
+        length = np.sqrt(np.vecdot(r, r))[..., None]
+        return e - r - length * np.array([0.0, 0.0, 1.0], e.dtype), ed - rate
+
 
 AGENT = Agent(
     robot="q450",
@@ -161,6 +176,7 @@ AGENT = Agent(
     decision_period=0.015,
     tasks=TASKS,
     observation=task.OBSERVATION,
+    observations={"QuadSling-Payload-v0": sling.OBSERVATION},
     action=task.ACTION,
     nominal={"q450": q450},
 )

@@ -18,7 +18,7 @@ CONTROLLERS = (
     ),
     _shipped(
         "tde+ppo",
-        "TDE + a residual that reinforcement learning (PPO) has trained, one for each environment",
+        "biped, and quadrotor without a cable: TDE + a residual that reinforcement learning (PPO) has trained",
         {
             "BipedPush-v0": "biped-push",
             "BipedWalk-Payload-v0": "biped-walk",

@@ -68,7 +68,8 @@ def _trained_in(saved: Saved) -> Any:
     if agent.observation is not None and agent.action is not None:
         if saved.nominal not in agent.nominal:
             raise PolicyFileError("nominal_robot", saved.nominal, ", ".join(map(repr, agent.nominal)))
-        return _Trained(saved, agent.observation, agent.action, agent.nominal[saved.nominal]())
+        layout = agent.observations.get(str(saved.about.get("env_id")), agent.observation)
+        return _Trained(saved, layout, agent.action, agent.nominal[saved.nominal]())
     env_id, kwargs = saved.about.get("env_id"), saved.about.get("env_kwargs")
     if env_id not in ours() or not isinstance(kwargs, dict):  # never a "module:id", which would be imported
         raise PolicyFileError("about: env_id", env_id, suggest_names(env_id, ours()))

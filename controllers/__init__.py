@@ -19,8 +19,9 @@ def make(name: str, env: Any, **overrides: Any) -> Any:
 
     Args:
         name: "tde", "atde", "artde", "artde-robust", "pid", "tde+c", "tde+kd"; for the biped "computed-torque",
-            "tde-stiff", "artde-stiff", "tde-switched", "atde-switched" and "artde-switched"; for the quadrotor
-            "tde-tight", "asmc", "geometric", "indi"; or whatever was given to `artde_gym.register_controller`.
+            "tde-stiff", "atde-stiff", "artde-stiff", "tde-switched", "atde-switched" and "artde-switched"; for the
+            quadrotor "tde-tight", "asmc", "geometric", "indi", with a cable "tde+swing", "atde+swing", "artde+swing"
+            and "geometric-load"; or whatever was given to `artde_gym.register_controller`.
         env: the environment that it will drive; its robot decides which policy the name stands for.
         overrides: gains in place of the preset's, and `preset="thesis"`, `"robust"`, ...; for laws on all joints also
             `velocity_cutoff_hz` and `time_base`, see `controllers.joint_space.make_joint_space`; of the quadrotor's two

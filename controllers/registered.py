@@ -16,6 +16,7 @@ CONTROLLERS = (
     *(_law(name, LAWS[name].text, law=name) for name in GAINS),
     _law("artde-robust", "ARTDE with bounded gains", law="artde", preset="robust"),
     _law("tde-stiff", "biped: TDE at a larger m_bar, with a margin to its limit", law="tde", preset="stiff"),
+    _law("atde-stiff", "biped: ATDE at a larger m_bar, with a margin to its limit", law="atde", preset="stiff"),
     _law("artde-stiff", "biped: ARTDE at a larger m_bar, with a margin to its limit", law="artde", preset="stiff"),
     _law("tde-tight", "quadrotor: TDE tuned on Q1, whose tracking is the tightest", law="tde", preset="tuned"),
     _law("geometric", "quadrotor: geometric control on SE(3), with an integral", law="geometric"),

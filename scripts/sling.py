@@ -43,7 +43,9 @@ LAWS: dict[str, tuple[str, dict[str, Any]]] = {
     "ATDE + swing": ("atde+swing", {}),
     "ARTDE + swing": ("artde+swing", {}),
     "TDE + swing, m_bar 1.6": ("tde+swing", {"preset": "slung"}),
+    "TDE + swing, tuned": ("tde+swing", {"preset": "tuned"}),
     "geometric, of the load": ("geometric-load", {}),
+    "geometric, of the load, tuned": ("geometric-load", {"preset": "tuned"}),
 }
 COLUMNS = {
     "rmse_m": ("vehicle mm", 1e3, 1),

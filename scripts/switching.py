@@ -1,7 +1,7 @@
 """The walks behind docs/laws/switched.md: laws that switch with the support phase against laws that do not.
 
 python scripts/switching.py held-out   gaits, frictions and payloads by which nothing was chosen; S1 to S3, 1 and 4 ms,
-                                       without and with the ground force
+                                       without and with the ground force, under TDE, ATDE and ARTDE
 python scripts/switching.py tables     the tables of what there is of that
 python scripts/switching.py flags      S1-L4 and S2-L4 with contact flags that lie
 python scripts/switching.py cost       computing time of a call
@@ -28,6 +28,7 @@ from artde_gym.evaluation import statistics
 from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.evaluation.side_by_side import SideBySide
 from artde_gym.evaluation.vector_rollout import run_vector
+from artde_gym.files import write_atomically
 from artde_gym.robots.ojas.task import OBSERVATION
 from artde_gym.scenarios import SCENARIOS
 from controllers.drive import DRIVES
@@ -36,9 +37,8 @@ GAITS = ((0.06, 1.3), (0.14, 0.8), (0.06, 0.8), (0.14, 1.3))  # m/s, s a step; t
 GROUNDS = ((0.55, 0.8), (1.0, 1.9))  # friction, payload in kg; the prototype knew 0.7 to 0.9 and 1.3 kg
 FORMS = ("S1", "S2", "S3")
 SHARES = (0, 45, 33)  # ground force, % of the weight
-PARTS = [(4, share, gait) for share in (0, 45) for gait in (0, 1)] + [(1, share, 1) for share in (0, 45)]
-PARTS += [(4, share, gait) for share, gait in ((0, 2), (45, 2), (0, 3), (45, 3), (33, 0), (33, 1), (33, 2), (33, 3))]
-PARTS += [(1, share, gait) for share, gait in ((0, 0), (45, 0), (33, 1), (33, 0))]
+PARTS = [(4, share, gait) for share in SHARES for gait in range(len(GAITS))]
+PARTS += [(1, share, gait) for gait in (1, 0) for share in SHARES]
 """L in ms, ground force, number of the gait, in the order in which they are run."""
 DURATION, PUSHES = 20.0, (8.0, 13.0)  # s; of S3, which has them at 28 and 37 s
 SEED = 1919
@@ -48,9 +48,10 @@ TOUCHDOWN, UNLOADED = 0.06, 0.2  # s after a landing, s of no load before it
 _SWITCHED = DRIVES["ojas"].presets["tde-switched", "support"].gains
 _LEFT, _BOTH, _RIGHT = _SWITCHED.matrices(12, np.float64)
 MEAN = (0.405 * (_LEFT + _RIGHT) + 0.19 * _BOTH).tolist()  # the same matrices, each for its share of the time
+BASES = ("tde", "atde", "artde")
 LAWS: dict[str, tuple[str, dict[str, Any]]] = {
     f"{law.upper()}, {text}": (name.format(law), gains)
-    for law in ("tde", "artde")
+    for law in BASES
     for text, name, gains in (
         ("0.042", "{}", {}),
         ("0.077", "{}", {"preset": "stiff"}),
@@ -130,10 +131,10 @@ def walks(
     return pd.DataFrame(found)
 
 
-def part(milliseconds: int, share: int, gait: int) -> pd.DataFrame:
-    """Walk S1 to S3 on both grounds with a gait under all laws."""
+def part(milliseconds: int, share: int, gait: int, base: str) -> pd.DataFrame:
+    """Walk S1 to S3 on both grounds with a gait under all forms of a law."""
     rows: list[tuple[str, dict[str, Any], int, dict[str, Any]]] = []
-    for name, (ground, (friction, mass)), law in itertools.product(FORMS, enumerate(GROUNDS), LAWS):
+    for name, (ground, (friction, mass)), law in itertools.product(FORMS, enumerate(GROUNDS), forms(base)):
         world = len(GROUNDS) * gait + ground
         rows.append((law, scenario(name, share, friction, mass), world, {"form": name, "share": share}))
     speed, step_duration = GAITS[gait]
@@ -141,11 +142,18 @@ def part(milliseconds: int, share: int, gait: int) -> pd.DataFrame:
     return found.assign(ms=milliseconds)
 
 
+def forms(base: str) -> list[str]:
+    """Return the labels of a law's forms."""
+    return [law for law in LAWS if law.startswith(f"{base.upper()}, ")]
+
+
 def held_out(folder: Path) -> None:
-    files = [folder / f"held-out-{ms}ms-{share}-{gait}.csv" for ms, share, gait in PARTS]
-    for file, chosen in zip(files, PARTS, strict=True):
-        if not file.exists():
-            part(*chosen).to_csv(file, index=False)
+    for ms, share, gait in PARTS:
+        for base in BASES:
+            file = folder / f"held-out-{ms}ms-{share}-{gait}-{base}.csv"
+            if not file.exists():
+                text = part(ms, share, gait, base).to_csv(index=False).encode()
+                write_atomically(file, lambda out, text=text: out.write(text))
     print(tables(folder))
 
 
@@ -158,9 +166,9 @@ def tables(folder: Path) -> str:
         if len(chosen):
             by_law = {law: chosen[chosen["law"] == law].set_index("world").sort_index() for law in LAWS}
             cases[f"{name}, {ms} ms, {share} %"] = by_law
-    text = [
-        table("falls", list(LAWS), {case: [falls(rows) for rows in by_law.values()] for case, by_law in cases.items()})
-    ]
+    title = "falls at " + ", ".join(law.partition(", ")[2] for law in forms(BASES[0]))
+    laws = [base.upper() for base in BASES]
+    text = [table(title, laws, {case: [falls(by_law, base) for base in BASES] for case, by_law in cases.items()})]
     rivals = [law for law in LAWS if not law.endswith("switched")]
     for column, (title, _, _) in COLUMNS.items():
         rows = {case: [ratio(by_law, rival, column) for rival in rivals] for case, by_law in cases.items()}
@@ -174,15 +182,18 @@ def tables(folder: Path) -> str:
 
 def table(title: str, heads: Sequence[str], rows: Mapping[str, Sequence[str]]) -> str:
     lines = [f"| {title} | " + " | ".join(heads) + " |", "|---|" + "---|" * len(heads)]
-    return "\n".join(lines + [f"| {name} | " + " | ".join(cells) + " |" for name, cells in rows.items()])
+    return "\n".join(lines + [f"| {name} | " + " | ".join(cells) + " |" for name, cells in rows.items() if any(cells)])
 
 
 def walked(rows: pd.DataFrame) -> pd.DataFrame:
     return rows.loc[~rows["fell"].astype(bool).to_numpy()]
 
 
-def falls(rows: pd.DataFrame) -> str:
-    return f"{len(rows) - len(walked(rows))}/{len(rows)}"
+def falls(by_law: Mapping[str, pd.DataFrame], base: str) -> str:
+    """Return the falls under each form of a law."""
+    rows = [by_law[law] for law in forms(base)]
+    counts = ", ".join(str(len(one) - len(walked(one))) for one in rows)
+    return f"{counts} of {len(rows[0])}" if len(rows[0]) else ""
 
 
 def means(rows: pd.DataFrame) -> str:
@@ -205,6 +216,7 @@ def ratio(by_law: Mapping[str, pd.DataFrame], rival: str, column: str) -> str:
 def lying(kind: str, contact: slice) -> Callable[[Any], Any]:
     """Return a function that falsifies the contact flags in observations, one after the other."""
     before: list[Any] = []
+    coins = np.random.default_rng(SEED)
     sides = {"left": [contact.start], "both": [contact.start, contact.start + 1]}
 
     def change(observation: Any) -> Any:
@@ -215,6 +227,10 @@ def lying(kind: str, contact: slice) -> Callable[[Any], Any]:
             observation[:, contact] = before[max(0, len(before) - 1 - int(rest))]
         elif word in sides:
             observation[:, sides[word]] = 1.0 if rest == "on" else 0.0
+        elif word == "swapped":
+            observation[:, contact] = observation[:, contact][:, ::-1]
+        elif word == "random":
+            observation[:, contact] = coins.integers(0, 2, observation[:, contact].shape)
         return observation
 
     return change
@@ -227,6 +243,8 @@ LIES = {
     "both always on": "both on",
     "12 ms late": "late 3",
     "20 ms late": "late 5",
+    "left and right swapped": "swapped",
+    "a coin for each foot and sample": "random",
 }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -21,10 +21,13 @@ from artde_gym.palette import STYLES
 from artde_gym.report.chart import Axis, Chart
 from controllers.design import DELAYED, Design, designed
 from controllers.design import design as work_out
+from controllers.drive import DRIVES
 from controllers.support_design import SWITCHED, SupportDesign, derived_gains, design_supports
 
 NAMES = {ROBOTS[robot].title: robot for robot in designed() if robot in ROBOTS}
 """Robots by title."""
+WALKERS = [title for title, robot in NAMES.items() if DRIVES[robot].supports is not None]
+CAP = 0.09  # kg m^2
 
 
 def design(
@@ -40,8 +43,9 @@ def design(
     step_duration: Annotated[float | None, typer.Option(help="Biped only: duration of a step (s). Default: 1.")] = None,
     motion: Annotated[str | None, typer.Option(help="JSON; arguments of another robot's motion.")] = None,
     cap: Annotated[
-        float, typer.Option(help="Laws that switch: largest eigenvalue of what is derived (kg m^2).")
-    ] = 0.09,
+        float | None,
+        typer.Option(help=f"Laws that switch: largest eigenvalue of what is derived (kg m^2). Default: {CAP:g}."),
+    ] = None,
     figure: Annotated[
         Path | None, typer.Option(help="SVG file for the limit along the reference, one per loop.")
     ] = None,
@@ -59,11 +63,13 @@ def design(
     walk = {"actuator_inertia": actuator_inertia, "speed": speed, "step_duration": step_duration}
     given = {name: value for name, value in walk.items() if value is not None} | json_object("--motion", motion)
     if law in SWITCHED:
-        if figure is not None:
-            raise OptionError("figure", str(figure), f"a law with one m_bar: {', '.join(DELAYED)}")
+        _refuse_one_inertia(robot, {"figure": figure, "period": period})
         chosen = json_object("gains", gains)
-        _show_supports(robot, law, design_supports(NAMES[robot], law, preset, cap, gains=chosen, **given), as_json)
+        judged = design_supports(NAMES[robot], law, preset, CAP if cap is None else cap, gains=chosen, **given)
+        _show_supports(robot, law, judged, as_json)
         return
+    if cap is not None:
+        raise OptionError("cap", cap, f"with a law that switches: {', '.join(SWITCHED)}")
     found = work_out(NAMES[robot], law, preset, period, gains=json_object("gains", gains), **given)
     if figure is not None:
         if not figure.name:
@@ -76,6 +82,15 @@ def design(
         return
     for one in found:
         _print(one, Console())
+
+
+def _refuse_one_inertia(robot: str, options: dict[str, Any]) -> None:
+    """Raise OptionError for a robot that does not walk, and for options that a law which switches does not have."""
+    if robot not in WALKERS:
+        raise OptionError("robot of a law that switches", robot, ", ".join(map(repr, WALKERS)))
+    for name, value in options.items():
+        if value is not None:
+            raise OptionError(name, str(value), f"with a law of one m_bar: {', '.join(DELAYED)}")
 
 
 def draw(one: Design) -> str:

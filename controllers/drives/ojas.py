@@ -45,8 +45,9 @@ def supports(
     Raises:
         OptionError: for an argument out of range.
     """
-    from artde_gym.robots.ojas.walking import STAND, walking_pattern  # as above
+    from artde_gym.robots.ojas.walking import STAND, check_gait, walking_pattern  # as above
 
+    speed, step_duration = check_gait(speed, step_duration)
     first, last = (round((STAND + steps * step_duration) / _SAMPLED) for steps in (_STEADY, _STEADY + 2))
     pattern = walking_pattern(speed, step_duration, 2 * STAND + (_STEADY + 4) * step_duration, _SAMPLED)
     spec, load, q = ojas(actuator_inertia), pattern.load_left[first:last], pattern.q[first:last]

@@ -73,12 +73,15 @@ def test_claims_of_the_laws_that_switch() -> None:
         "tde": 1.0,
         "tde-stiff": 0.6,
         "tde-switched": 0.5,
+        "atde": 0.7,
+        "atde-stiff": 0.45,
+        "atde-switched": 0.4,
         "artde": 0.4,
         "artde-stiff": 0.35,
         "artde-switched": 0.36,
     }
     found = verdicts(walks(errors, "S1-L4"), walks(errors, "S2-L4", fell=("tde-switched",)))
-    for law, stiff in (("TDE", "holds"), ("ARTDE", "does not hold")):
+    for law, stiff in (("TDE", "holds"), ("ATDE", "holds"), ("ARTDE", "does not hold")):
         own = f"{law} that switches with the support phase beats {law}"
         assert found["S1-L4", f"{own} at the preset stiff, 0.077"] == stiff
         assert found["S1-L4", f"{own} at the thesis' m_bar of 0.042"] == "holds"
@@ -88,6 +91,7 @@ def test_claims_of_the_laws_that_switch() -> None:
     )
     own = [claim for claim in CLAIMS if "switches" in claim.text]
     assert all(claim.takes[0].endswith("-switched") for claim in own)
+    assert {claim.takes[0] for claim in own} == {"tde-switched", "atde-switched", "artde-switched"}
     assert {claim.scenario for claim in own} >= {"S1", "S3-L4", "S2-GRF33", "S3-GRF45"}
 
 

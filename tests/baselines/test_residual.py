@@ -36,7 +36,7 @@ LAWS = list(registered_controllers())
 SLUNG = {"geometric-load", "tde+swing", "atde+swing", "artde+swing"}
 QUADROTOR_ONLY = {"asmc", "indi", "geometric", "tde-tight", *SLUNG}
 SWITCHED = {"tde-switched", "atde-switched", "artde-switched"}
-BIPED_ONLY = {"computed-torque", "tde+balance", "tde-stiff", "artde-stiff", *SWITCHED}
+BIPED_ONLY = {"computed-torque", "tde+balance", "tde-stiff", "atde-stiff", "artde-stiff", *SWITCHED}
 CASES = [
     (env_id, base)
     for env_id, (name, _) in ENVIRONMENTS.items()

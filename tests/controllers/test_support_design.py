@@ -114,6 +114,7 @@ def test_an_inertia_beyond_a_limit_is_told() -> None:
         ({"gains": {"dwell": -1.0}}, "dwell"),
         ({"gait": 1}, "gait"),
         ({"speed": 3.0}, "speed"),
+        *(({"step_duration": value}, "step_duration") for value in (float("nan"), float("inf"), 1e300, "1", None)),
     ],
 )
 def test_what_is_wrong_is_named(arguments: dict[str, Any], words: str) -> None:
@@ -131,5 +132,19 @@ def test_the_command_derives_gains_for_another_gait() -> None:
     judged = design_supports("ojas", gains=found["gains"], speed=0.2, cap=0.07)
     assert all(np.linalg.eigvalsh(np.asarray(one.m_bar)).max() < 0.0701 for one in judged if one.derived is not None)
     assert all(one.valid for one in judged)
-    run = CliRunner().invoke(app, ["design", "--law", "tde-switched", "--figure", "x.svg"])
-    assert run.exit_code != 0
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--law", "tde-switched", "--figure", "x.svg"], "figure"),
+        (["--law", "tde-switched", "--period", "0.004"], "period"),
+        (["--law", "tde", "--cap", "0.05"], "cap"),
+        (["--law", "tde-switched", "--robot", "arm"], "'arm'; allowed: 'biped'"),
+        (["--law", "artde-switched", "--robot", "quadrotor"], "'quadrotor'; allowed: 'biped'"),
+    ],
+)
+def test_the_command_ignores_no_option(options: list[str], words: str) -> None:
+    run = CliRunner().invoke(app, ["design", *options])
+    assert isinstance(run.exception, ArtdeGymError)
+    assert words in str(run.exception)

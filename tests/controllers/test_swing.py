@@ -133,3 +133,11 @@ def test_the_control_of_the_load_brings_it_back() -> None:
     swing, error = swings("geometric-load", 0.35, 0.5)
     assert swing[-60:].max() < np.radians(2)
     assert error[-60:].max() < 0.06
+
+
+@pytest.mark.parametrize("name", ["tde+swing", "geometric-load"])
+@pytest.mark.parametrize(("mass", "cable"), [(0.2, 0.8), (0.5, 0.4)])
+def test_tuned_gains_keep_the_load_nearer_than_the_default(name: str, mass: float, cable: float) -> None:
+    _, default = swings(name, mass, cable)
+    _, tuned = swings(name, mass, cable, preset="tuned")
+    assert np.sqrt(np.mean(tuned**2)) < np.sqrt(np.mean(default**2))

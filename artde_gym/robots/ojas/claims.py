@@ -107,7 +107,7 @@ CLAIMS: tuple[Claim, ...] = (
         )
         for suffix in _ALL
         for name in ("S1", "S2", "S3")
-        for law in ("tde", "artde")
+        for law in ("tde", "atde", "artde")
         for rival, said in (("{}", "at the thesis' m_bar of 0.042"), ("{}-stiff", "at the preset stiff, 0.077"))
     ),
 )

@@ -83,6 +83,19 @@ def hip_height_above_ankle(speed: float, step_duration: float = 1.0) -> float:
     return min(0.395 - 0.25 * speed, 0.38 - (0.25 + 0.62 * step_duration) * (speed * step_duration) ** 2)
 
 
+def check_gait(speed: float, step_duration: float) -> tuple[float, float]:
+    """Return a speed (m/s) and a duration of a step (s) that can be walked.
+
+    Raises:
+        OptionError: for a speed outside 0 to 0.25 m/s, a step outside 0.6 to 2 s, or a step longer than 0.25 m.
+    """
+    speed = check_number("speed", speed, 0.0, 0.25, "0 to 0.25 m/s")
+    step_duration = check_number("step_duration", step_duration, 0.6, 2.0, "0.6 to 2 s")
+    if speed * step_duration > 0.25:
+        raise OptionError("speed * step_duration", speed * step_duration, "a step of at most 0.25 m")
+    return speed, step_duration
+
+
 def walking_pattern(
     speed: float = 0.1, step_duration: float = 1.0, duration: float = 58.0, period: float = 0.001
 ) -> WalkingPattern:
@@ -91,13 +104,9 @@ def walking_pattern(
     The result is cached and its arrays are read-only, so that all environments of a process share it.
 
     Raises:
-        OptionError: for a speed outside 0 to 0.25 m/s, a step outside 0.6 to 2 s, a step longer than 0.25 m, a walk
-            outside 0.1 to 1800 s, or a period outside 1e-6 to 0.1 s.
+        OptionError: as `check_gait`, or for a walk outside 0.1 to 1800 s or a period outside 1e-6 to 0.1 s.
     """
-    speed = check_number("speed", speed, 0.0, 0.25, "0 to 0.25 m/s")
-    step_duration = check_number("step_duration", step_duration, 0.6, 2.0, "0.6 to 2 s")
-    if speed * step_duration > 0.25:
-        raise OptionError("speed * step_duration", speed * step_duration, "a step of at most 0.25 m")
+    speed, step_duration = check_gait(speed, step_duration)
     duration = check_number("duration", duration, 0.1, MAX_DURATION, f"0.1 to {MAX_DURATION:g} s")
     period = check_number("period", period, 1e-6, 0.1, "1e-6 to 0.1 s")
     return _pattern(speed, step_duration, duration, period)  # positional: the cache distinguishes keyword arguments
