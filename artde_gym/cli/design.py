@@ -13,14 +13,17 @@ from rich.console import Console
 from rich.table import Table
 
 from artde_gym.arguments import check_number
-from artde_gym.cli.arguments import json_object
+from artde_gym.cli.arguments import EnvKwargs, json_object
+from artde_gym.cli.workspace_design import show_workspace
 from artde_gym.errors import OptionError
+from artde_gym.evaluation.environments import robot_of
 from artde_gym.files import write_atomically
 from artde_gym.kit import ROBOTS
 from artde_gym.palette import STYLES
 from artde_gym.report.chart import Axis, Chart
 from controllers.design import DELAYED, Design, designed
 from controllers.design import design as work_out
+from controllers.drive import DRIVES
 from controllers.support_design import SWITCHED, SupportDesign, derived_gains, design_supports
 
 NAMES = {ROBOTS[robot].title: robot for robot in designed() if robot in ROBOTS}
@@ -28,7 +31,9 @@ NAMES = {ROBOTS[robot].title: robot for robot in designed() if robot in ROBOTS}
 
 
 def design(
-    robot: Annotated[str, typer.Option(help=f"{' or '.join(NAMES)}.")] = "biped",
+    robot: Annotated[str | None, typer.Option(help=f"{' or '.join(NAMES)}. Default: biped.")] = None,
+    env: Annotated[str | None, typer.Option(help="Environment id, in place of the robot.")] = None,
+    env_kwargs: EnvKwargs = None,
     law: Annotated[str, typer.Option(help=f"{', '.join((*DELAYED, *SWITCHED))}.")] = "tde",
     preset: Annotated[str | None, typer.Option(help="Preset of the law's gains; see `list controllers`.")] = None,
     gains: Annotated[str | None, typer.Option(help='JSON; override gains of the preset, e.g. {"m_bar": 0.08}.')] = None,
@@ -43,7 +48,11 @@ def design(
         float, typer.Option(help="Laws that switch: largest eigenvalue of what is derived (kg m^2).")
     ] = 0.09,
     figure: Annotated[
-        Path | None, typer.Option(help="SVG file for the limit along the reference, one per loop.")
+        Path | None,
+        typer.Option(
+            help="SVG file for the limit along the reference, one per loop; of an arm for the eigenvalues over its "
+            "workspace."
+        ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
@@ -52,12 +61,18 @@ def design(
     Of a law that switches with the support phase, print the range of each phase; --json holds, as "gains", the nominal
     inertias that follow from the robot's spec and gait.
     """
-    if robot not in NAMES:
-        raise OptionError("robot", robot, ", ".join(map(repr, NAMES)))
+    robot = _robot(robot, env)
     if period is not None:
         check_number("period", period, 1e-6, 10.0, "1e-6 to 10 s")
     walk = {"actuator_inertia": actuator_inertia, "speed": speed, "step_duration": step_duration}
     given = {name: value for name, value in walk.items() if value is not None} | json_object("--motion", motion)
+    arguments = json_object("--env-kwargs", env_kwargs)
+    if figure is not None and not figure.name:
+        raise OptionError("figure", str(figure), "the path of a file, such as m_bar.svg")
+    if env is not None and DRIVES[NAMES[robot]].workspace is not None:
+        show_workspace(env, arguments | given, law, json_object("gains", gains), period, figure, as_json)
+        return
+    given |= arguments
     if law in SWITCHED:
         if figure is not None:
             raise OptionError("figure", str(figure), f"a law with one m_bar: {', '.join(DELAYED)}")
@@ -66,8 +81,6 @@ def design(
         return
     found = work_out(NAMES[robot], law, preset, period, gains=json_object("gains", gains), **given)
     if figure is not None:
-        if not figure.name:
-            raise OptionError("figure", str(figure), "the path of a file, such as m_bar.svg")
         for one in found:
             drawing = draw(one).encode()
             write_atomically(_file(figure, one, len(found) > 1), lambda file, drawing=drawing: file.write(drawing))
@@ -76,6 +89,25 @@ def design(
         return
     for one in found:
         _print(one, Console())
+
+
+def _robot(robot: str | None, env: str | None) -> str:
+    """Return the title of a robot, given by itself or by an environment.
+
+    Raises:
+        OptionError: for an unknown one, or both.
+    """
+    if env is not None:
+        if robot is not None:
+            raise OptionError("robot", robot, "none with an environment")
+        known = {name: title for title, name in NAMES.items()}
+        if (name := robot_of(env)) not in known:
+            raise OptionError("env", env, f"an environment of {' or '.join(NAMES)}")
+        return known[name]
+    title = "biped" if robot is None else robot
+    if title not in NAMES:
+        raise OptionError("robot", title, ", ".join(map(repr, NAMES)))
+    return title
 
 
 def draw(one: Design) -> str:
