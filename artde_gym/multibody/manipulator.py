@@ -21,6 +21,8 @@ from artde_gym.multibody.spec import Link, RobotSpec, Rotation, Vector
 BASE, TOOL = "base", "tool"
 RESERVED = (BASE, "all", "ground", "payload", "world")
 """Names that joints cannot have, since engines or the grammar of disturbances use them."""
+SHOWN = 12
+"""Ends of chains that an error lists."""
 GEAR_RATIO = 100.0
 """Of rotors in engines without armature: the larger, the less the carrying link's own rotation spins them."""
 
@@ -46,14 +48,16 @@ def manipulator(
     end = _tip(tree) if tip is None else tip
     chain = [link for link in _way(links, end) if link.joint is not None and not link.joint.follows]
     if not chain:
-        raise RobotError(f"joints from the base to {end!r} in {tree.file}", 0, "at least one; name another `tip`")
+        allowed = f"at least one; name another `tip`, such as the ends {_ends(tree)}"
+        raise RobotError(f"joints from the base to {end!r} in {tree.file}", 0, allowed)
     names = _names(tree, chain)
-    parts = tuple(_part(link, names, tree.file) for link in tree.links)
+    moved = _moved(tree, chain)
+    parts = tuple(_part(link if link.name in moved else _massless(link), names, tree.file) for link in tree.links)
     joints = tuple(names[link.name] for link in chain)
     sites: dict[str, tuple[str, Vector]] = {TOOL: (names[end], (0.0, 0.0, 0.0))}
     sites |= {link.name: (names[link.name], (0.0, 0.0, 0.0)) for link in tree.links[1:] if link.name != TOOL}
     given = tuple(link.joint.armature for link in chain if link.joint is not None)
-    spec = RobotSpec(
+    whole = RobotSpec(
         name="arm",
         links=parts,
         actuated=joints,
@@ -63,9 +67,25 @@ def manipulator(
         sites=tuple((site, *place) for site, place in sites.items()),
         fixed=True,
         carrier=names[end],
-    ).merged()
+    )
+    with _told_of(tree.file):
+        spec = whole.merged()
     _check_moving(spec, tree.file)
     return spec
+
+
+def _ends(tree: ModelTree) -> str:
+    """Return the names of the links at which chains of joints end, those of the longest first."""
+    depth = {tree.links[0].name: 0}
+    ends: dict[str, int] = {}
+    for link in tree.links[1:]:
+        depth[link.name] = depth[str(link.parent)] + (link.joint is not None and not link.joint.follows)
+        if link.joint is not None and not link.joint.follows:
+            ends[link.name] = depth[link.name]
+        if depth[link.name] > depth[str(link.parent)]:
+            ends.pop(str(link.parent), None)
+    most = sorted(ends, key=lambda name: -ends[name])[:SHOWN]
+    return ", ".join(map(repr, most)) if most else "of another file: this one has no joints that move"
 
 
 def _tip(tree: ModelTree) -> str:
@@ -109,34 +129,45 @@ def _names(tree: ModelTree, chain: Sequence[FileLink]) -> dict[str, str]:
     return names
 
 
+def _moved(tree: ModelTree, chain: Sequence[FileLink]) -> set[str]:
+    """Return the links that an actuated joint moves."""
+    moved = {link.name for link in chain}
+    for link in tree.links:  # parents come first
+        if link.parent in moved:
+            moved.add(link.name)
+    return moved
+
+
+def _massless(link: FileLink) -> FileLink:
+    """Return a link that never moves without its inertia, which then cannot matter."""
+    return link._replace(mass=0.0, com=np.zeros(3), inertia=np.zeros((3, 3)))
+
+
 def _part(link: FileLink, names: dict[str, str], file: str) -> Link:
     """Return a link of the spec: locked, unless it has its joint's name."""
     joint, name = link.joint, names[link.name]
     moves = joint is not None and name == joint.name
     origin, rotation = (link.origin, link.rotation) if moves else _locked(link)
-    mass, com, inertia = link.mass, link.com, link.inertia
-    if link.parent is None:  # it never moves
-        mass, com, inertia = 0.0, np.zeros(3), np.zeros((3, 3))
     parent = None if link.parent is None else names[link.parent]
-    with _told_of(link.name, file):
+    with _told_of(file, link.name):
         body = Link(
-            *(name, mass, _vector(com), _vector(np.diag(inertia)), parent, _vector(origin)),
-            products=_vector(inertia[[0, 0, 1], [1, 2, 2]]),
+            *(name, link.mass, _vector(link.com), _vector(np.diag(link.inertia)), parent, _vector(origin)),
+            products=_vector(link.inertia[[0, 0, 1], [1, 2, 2]]),
             rotation=_rows(rotation),
         )
         return _driven(body, joint, file) if joint is not None and moves else body
 
 
 @contextlib.contextmanager
-def _told_of(link: str, file: str) -> Iterator[None]:
-    """Name link and file in errors about a body."""
+def _told_of(file: str, link: str | None = None) -> Iterator[None]:
+    """Name file and link in errors about a body."""
     try:
         yield
     except RobotError as error:
         if file in error.field:
             raise
-        what = error.field.partition(" of ")[0]
-        raise RobotError(f"{what} of link {link!r} in {file}", error.value, error.allowed) from error
+        field = error.field if link is None else f"{error.field.partition(' of ')[0]} of link {link!r}"
+        raise RobotError(f"{field} in {file}", error.value, error.allowed) from error
 
 
 def _driven(body: Link, joint: FileJoint, file: str) -> Link:

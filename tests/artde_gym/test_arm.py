@@ -1,6 +1,7 @@
 """`ArmTrack-Payload-v0`: references, friction, equilibrium, both engines, batches, designed gains on unknown files."""
 
 import copy
+import dataclasses
 import math
 import warnings
 from pathlib import Path
@@ -17,7 +18,7 @@ from artde_gym.errors import DisturbanceError, OptionError, RobotError
 from artde_gym.motion.scene import scene_of
 from artde_gym.multibody.dynamics import RigidBodyTree
 from artde_gym.robots.arm.panda import panda
-from artde_gym.robots.arm.reference import MULTI_SINE, PICK, reference
+from artde_gym.robots.arm.reference import MULTI_SINE, PICK, home, reference
 from artde_gym.robots.arm.task import Tracking
 from artde_gym.robots.arm.workspace import workspace_inertia
 from controllers.arm_design import LEVEL, design_arm, designed, largest_bandwidth
@@ -240,6 +241,11 @@ def test_limits_of_position_end_an_episode():
 def test_impossible_arguments_are_refused(arguments, error):
     with pytest.raises(error):
         make(**arguments)
+
+
+def test_an_arm_with_the_names_of_the_built_in_one_has_its_own_home():
+    links = (dataclasses.replace(link, limits=(0.5, 1.5)) if link.axis else link for link in panda().links)
+    np.testing.assert_allclose(home(dataclasses.replace(panda(), links=tuple(links))), 1.0)
 
 
 # ----------------------------------------------------------------------------------------------------------- design

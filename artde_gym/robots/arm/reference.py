@@ -16,7 +16,7 @@ import numpy as np
 from artde_gym.arrays import Array
 from artde_gym.errors import OptionError
 from artde_gym.multibody.spec import RobotSpec
-from artde_gym.robots.arm.panda import HOME, NAMES
+from artde_gym.robots.arm.panda import HOME, panda
 
 PICK, MULTI_SINE = "pick-and-place", "multi-sine"
 KINDS = (PICK, MULTI_SINE)
@@ -45,7 +45,7 @@ class Reference(NamedTuple):
 
 def home(spec: RobotSpec) -> Array:
     """Return the pose in the middle of the limits (n,); of the Panda one with a bent elbow."""
-    if spec.actuated == NAMES:
+    if spec == panda():  # another arm's joints may have the same names
         return np.array(HOME)
     return np.array([(low + high) / 2 if np.isfinite(low + high) else 0.0 for low, high in _limits(spec)])
 
