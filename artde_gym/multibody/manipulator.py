@@ -1,8 +1,8 @@
 """A manipulator as a `RobotSpec`, of a tree of links from a file.
 
-The joints from the base to the tip are actuated and name the links that they carry; all others (grippers, mimic joints)
-are locked at zero, or where their limits are closest to it. Every link of the file is a site at its frame's origin,
-the tip's is "tool", which also carries the payload.
+The joints from the base to the tip, or some of them, are actuated and name the links that they carry; all others
+(grippers, mimic joints) are locked at zero, or where their limits are closest to it. Every link of the file is a site
+at its frame's origin, the tip's is "tool", which also carries the payload.
 """
 
 from __future__ import annotations
@@ -28,7 +28,11 @@ GEAR_RATIO = 100.0
 
 
 def manipulator(
-    tree: ModelTree, *, tip: str | None = None, armature: float | Sequence[float] | None = None
+    tree: ModelTree,
+    *,
+    tip: str | None = None,
+    armature: float | Sequence[float] | None = None,
+    joints: Sequence[str] | None = None,
 ) -> RobotSpec:
     """Return the arm from the base to a tip.
 
@@ -38,29 +42,37 @@ def manipulator(
             beyond.
         armature: reflected inertia of each joint's rotor (kg m^2, or kg of a prismatic joint), one for all or one for
             each; None for the file's.
+        joints: names of those that move, on one way from the base; None for all up to the tip. Without a tip it is
+            then the last link that is fixed to the last of them.
 
     Raises:
-        RobotError: for a tree without joints on the way, an unknown tip, or a link or joint that cannot be simulated.
+        RobotError: for a tree without joints on the way, an unknown tip or joint, or a link or joint that cannot be
+            simulated.
     """
     links = {link.name: link for link in tree.links}
     if tip is not None and tip not in links:
         raise RobotError("tip", tip, suggest_names(tip, links))
-    end = _tip(tree) if tip is None else tip
+    chosen = None if joints is None else _chosen(tree, joints)
+    end = tip if tip is not None else _tip(tree) if chosen is None else _fixed_beyond(tree, chosen[-1].name)
     chain = [link for link in _way(links, end) if link.joint is not None and not link.joint.follows]
+    if chosen is not None:
+        way = _joint_names(chain)
+        if lost := [name for name in _joint_names(chosen) if name not in way]:
+            raise RobotError("joints", lost, f"on the way from the base to {end!r}: {', '.join(way)}")
+        chain = chosen
     if not chain:
         allowed = f"at least one; name another `tip`, such as the ends {_ends(tree)}"
         raise RobotError(f"joints from the base to {end!r} in {tree.file}", 0, allowed)
     names = _names(tree, chain)
     moved = _moved(tree, chain)
     parts = tuple(_part(link if link.name in moved else _massless(link), names, tree.file) for link in tree.links)
-    joints = tuple(names[link.name] for link in chain)
     sites: dict[str, tuple[str, Vector]] = {TOOL: (names[end], (0.0, 0.0, 0.0))}
     sites |= {link.name: (names[link.name], (0.0, 0.0, 0.0)) for link in tree.links[1:] if link.name != TOOL}
     given = tuple(link.joint.armature for link in chain if link.joint is not None)
     whole = RobotSpec(
         name="arm",
         links=parts,
-        actuated=joints,
+        actuated=tuple(names[link.name] for link in chain),
         torque_limit=max(part.effort for part in parts if part.axis is not None),
         armature=given if armature is None else _each(armature, len(chain)),
         gear_ratio=GEAR_RATIO,
@@ -106,6 +118,36 @@ def _tip(tree: ModelTree) -> str:
         if len(moving) > 1 or not below:
             return here
         here = moving[0] if moving else max((child.name for child in below), key=lambda name: depth[name])
+
+
+def _chosen(tree: ModelTree, joints: Sequence[str]) -> list[FileLink]:
+    """Return the links of joints, in the order of the tree.
+
+    Raises:
+        RobotError: for no list of different names, or a joint that does not exist or move by itself.
+    """
+    movable = {link.joint.name: link for link in tree.links if link.joint is not None and not link.joint.follows}
+    listed = isinstance(joints, Sequence) and not isinstance(joints, str)
+    wanted = [name for name in joints if isinstance(name, str)] if listed else []
+    if not wanted or len(wanted) != len(joints) or len(set(wanted)) != len(wanted):
+        raise RobotError("joints", joints, "a list of different names of joints")
+    for name in wanted:
+        if name not in movable:
+            raise RobotError(f"joint in {tree.file}", name, suggest_names(name, movable))
+    return [link for name, link in movable.items() if name in wanted]
+
+
+def _joint_names(chain: Sequence[FileLink]) -> list[str]:
+    return [link.joint.name for link in chain if link.joint is not None]
+
+
+def _fixed_beyond(tree: ModelTree, here: str) -> str:
+    """Return the last link of the longest chain of fixed links beyond a link."""
+    depth = {here: 0}
+    for link in tree.links:  # parents come first
+        if link.joint is None and link.parent in depth:
+            depth[link.name] = 1 + depth[link.parent]
+    return max(depth, key=lambda name: depth[name])
 
 
 def _way(links: dict[str, FileLink], end: str) -> list[FileLink]:

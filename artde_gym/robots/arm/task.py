@@ -78,6 +78,7 @@ real arm stops. *Truncated* at the end of the reference. Limits are no contacts,
 | `robot` | "panda" | "panda", path | the arm |
 | `tip` | None | link of the file | end of the chain of joints; None: where it ends or branches |
 | `armature` | None | kg m^2, one number or one for each joint | reflected rotor inertia; None: the file's |
+| `joints` | None | names of joints on one way from the base | those that move; None: all to the tip |
 | `reference` | "pick-and-place" | see `artde_gym.robots.arm.reference` | reference of the joints |
 | `disturbances` | {default} | see `artde_gym.disturbances` | disturbances; `{{}}` for none but nominal friction |
 | `control_period` | 0.001 | whole multiples of 0.001 s up to 0.05 | control period L |
@@ -171,6 +172,7 @@ class Tracking:
         robot: str | os.PathLike[str],
         tip: str | None,
         armature: float | Sequence[float] | None,
+        joints: Sequence[str] | None,
         given: Any,
         control_period: float,
         duration: float,
@@ -183,13 +185,13 @@ class Tracking:
         """
         substeps = steps_per_period(control_period, TIME_STEP)
         seconds = check_number("duration", duration, 0.1, 1800.0, "0.1 to 1800 s")
-        spec = arm(robot, tip, armature)
+        spec = arm(robot, tip, armature, joints)
         period = substeps * TIME_STEP
         last = max(1, round(seconds / period))
         found = reference(spec, given, period * np.arange(last + 1))
         plan = np.concatenate(found, axis=1)
         friction = _friction(spec)
-        arguments = (robot, tip, armature, given, control_period, duration)
+        arguments = (robot, tip, armature, joints, given, control_period, duration)
         return cls(spec, substeps, plan, _tool(spec, found.q), *friction, arguments)
 
     def __deepcopy__(self, _: dict[int, Any]) -> Tracking:
@@ -278,19 +280,22 @@ def friction_scale(sampled: Mapping[str, Any]) -> float:
 
 
 def arm(
-    robot: str | os.PathLike[str] = "panda", tip: str | None = None, armature: float | Sequence[float] | None = None
+    robot: str | os.PathLike[str] = "panda",
+    tip: str | None = None,
+    armature: float | Sequence[float] | None = None,
+    joints: Sequence[str] | None = None,
 ) -> RobotSpec:
     """Return a built-in arm or one from a file.
 
     Raises:
-        OptionError: for anything but a name or a path, or a tip or armature of a built-in arm.
+        OptionError: for anything but a name or a path, or a tip, armature or joints of a built-in arm.
         RobotError: for a file that cannot be simulated.
     """
     if not isinstance(robot, (str, os.PathLike)):
         raise OptionError("robot", robot, "'panda', or the path of a URDF or MJCF file")
     if robot != "panda":
-        return drawn(read_arm(robot, tip=tip, armature=armature))
-    for name, value in (("tip", tip), ("armature", armature)):
+        return drawn(read_arm(robot, tip=tip, armature=armature, joints=joints))
+    for name, value in (("tip", tip), ("armature", armature), ("joints", joints)):
         if value is not None:
             raise OptionError(name, value, "None with a built-in arm")
     return panda()
