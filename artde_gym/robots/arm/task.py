@@ -13,6 +13,8 @@ import numpy as np
 from artde_gym.arguments import check_number, steps_per_period
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
+from artde_gym.disturbances.friction import KIND as FRICTION
+from artde_gym.disturbances.friction import check_friction
 from artde_gym.disturbances.numeric import Words
 from artde_gym.errors import DisturbanceError, OptionError
 from artde_gym.layout import Field, Layout
@@ -32,7 +34,6 @@ MAX_SPEED = 200.0  # rad/s or m/s, bound of observed joint speeds; of joints wit
 TURN = 2 * math.pi  # rad, bound of observed angles of joints without limits
 FAR = 10.0  # m, bound of observed positions of the tool
 
-FRICTION = "joint_friction"
 REWARD_SCALES: dict[str, float] = {"alive": 1.0, "tracking": 2.0, "effort": -0.05, "smoothness": -0.05}
 """The reward of a control period L is L times the sum of these scales times their terms (see `DOCUMENTATION`)."""
 FALL_REASONS = ("position", "speed")
@@ -227,6 +228,7 @@ class Tracking:
     def parse(self, disturbances: Mapping[str, Any]) -> Disturbances:
         """Parse disturbances of this arm."""
         parsed = Disturbances.parse(disturbances, self.words["site"], self.words["joint"], self.nominal_robot.name)
+        check_friction(parsed.entries, float(smallest_inertia(self.nominal_robot).min()), TIME_STEP)
         for kind, entry in parsed.entries:
             if kind == "sensor_noise" and (entry["tilt"] != 0 or entry["angular_velocity"] != 0):
                 raise DisturbanceError("sensor_noise", dict(entry), "position, velocity: the base of an arm is fixed")
