@@ -19,8 +19,9 @@ from artde_gym.motion.scene import scene_of
 from artde_gym.multibody.dynamics import RigidBodyTree
 from artde_gym.robots.arm.panda import panda
 from artde_gym.robots.arm.reader import read_arm
-from artde_gym.robots.arm.reference import MULTI_SINE, PICK, home, reference
+from artde_gym.robots.arm.reference import FIGURE_EIGHT, KINDS, PICK, RISE, home, reference
 from artde_gym.robots.arm.task import Tracking
+from artde_gym.robots.arm.tool import Tool
 from artde_gym.robots.arm.workspace import workspace_inertia
 from controllers.arm_design import LEVEL, design_arm, designed, largest_bandwidth
 from controllers.laws.errors import GainError
@@ -99,7 +100,7 @@ def test_the_built_in_arm_agrees_with_pinocchio(judge):
         np.testing.assert_allclose(*forces, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("kind", [PICK, MULTI_SINE])
+@pytest.mark.parametrize("kind", KINDS)
 def test_references_are_smooth_and_begin_at_rest(kind):
     time = 1e-3 * np.arange(12_001)
     found = reference(panda(), kind, time)
@@ -109,6 +110,20 @@ def test_references_are_smooth_and_begin_at_rest(kind):
     np.testing.assert_allclose(found.qdd[0], 0.0, atol=1e-15)
     fastest = [panda().by_name[name].speed for name in panda().actuated]
     assert (np.abs(found.qd).max(axis=0) < fastest).all()
+
+
+def test_the_tool_draws_a_figure_eight(tmp_path):
+    """Eased in, at its place to a micrometer, the same in each round; also of an arm with a sliding joint."""
+    crane, pose = read_arm(small_arm(tmp_path)), [0.2, -0.4, 0.3]
+    time = 0.01 * np.arange(1001)
+    for spec, given in ((panda(), FIGURE_EIGHT), (crane, {"size": [0.15, 0.08], "period": 4.0, "pose": pose})):
+        found = reference(spec, given, time)
+        np.testing.assert_allclose(found.q[0], home(spec) if spec == panda() else pose, atol=1e-12)
+        place, phase = Tool(spec).position(found.q), 2 * np.pi / 4.0 * (time - RISE / 2)
+        eight = np.stack([0 * time, 0.15 * np.sin(phase), 0.08 * np.sin(2 * phase)], axis=1)
+        late = time >= RISE
+        np.testing.assert_allclose((place - place[0])[late], eight[late], atol=1e-6)
+        np.testing.assert_allclose(found.q[400], found.q[800], atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -122,6 +137,11 @@ def test_references_are_smooth_and_begin_at_rest(kind):
         {"times": [0, 1], "points": "here"},
         {"amplitude": -1.0, "frequency": 0.2},
         {"amplitude": 3.0, "frequency": 0.2},
+        {"size": [0.1], "period": 4.0},
+        {"size": [0.1, 0.1], "period": 0.0},
+        {"size": [0.1, 0.1], "period": 4.0, "pose": [0.0]},
+        {"size": [1.5, 1.5], "period": 4.0},
+        {"size": [0.1, 0.1], "period": 4.0, "speed": 1.0},
         {"amplitude": math.nan, "frequency": 0.2},
     ],
 )

@@ -26,6 +26,7 @@ from artde_gym.robots.arm.drawing import drawn
 from artde_gym.robots.arm.panda import panda
 from artde_gym.robots.arm.reader import read_arm
 from artde_gym.robots.arm.reference import reference
+from artde_gym.robots.arm.tool import Tool
 from artde_gym.robots.arm.workspace import smallest_inertia
 from artde_gym.sim.engine import World
 
@@ -193,7 +194,7 @@ class Tracking:
         plan = np.concatenate(found, axis=1)
         friction = _friction(spec)
         arguments = (robot, tip, armature, joints, given, control_period, duration)
-        return cls(spec, substeps, plan, _tool(spec, found.q), *friction, arguments)
+        return cls(spec, substeps, plan, Tool(spec).position(found.q), *friction, arguments)
 
     def __deepcopy__(self, _: dict[int, Any]) -> Tracking:
         return self  # immutable
@@ -318,13 +319,6 @@ def _friction(spec: RobotSpec) -> tuple[Array, Array, Array]:
             allowed = f"at most {most:.3g}, its smallest inertia over {TIME_STEP} s; servos' models carry such values"
             raise OptionError(f"damping of joint {name!r}", float(value), allowed)
     return damping, coulomb, np.maximum(slip, coulomb * TIME_STEP / inertia)
-
-
-def _tool(spec: RobotSpec, q: Array) -> Array:
-    tree = RigidBodyTree(spec)
-    _, link, point = next(site for site in spec.sites if site[0] == TOOL)
-    frames, body = tree.frames(q), [part.name for part in spec.links].index(link)
-    return frames.origin[:, body] + frames.rot[:, body] @ np.asarray(point)
 
 
 def reward_terms(error: Number, effort: Number, change: Number, exp: Callable[[Number], Number]) -> dict[str, Number]:
