@@ -1,4 +1,4 @@
-"""Where an arm's tool is, and how it moves with the joints."""
+"""Position of an arm's tool, and how it moves with the joints."""
 
 from __future__ import annotations
 
