@@ -18,6 +18,7 @@ import controllers
 from artde_gym.cli import app
 from artde_gym.multibody.spec import RobotSpec
 from artde_gym.robots.arm.panda import panda
+from controllers.drive import DRIVES
 from controllers.laws.errors import GainError
 from controllers.mode import force_noise, spectral_radius
 from controllers.workspace_design import CHATTER, advice, workspace_design
@@ -112,6 +113,14 @@ def test_advice_names_what_limits_a_design(spec: RobotSpec, gains: dict[str, Any
 def test_impossible_gains_are_refused(gains: dict[str, Any]) -> None:
     with pytest.raises(GainError):
         workspace_design(panda(), PERIOD, gains)
+
+
+def test_doctor_judges_the_arm_in_all_poses() -> None:
+    stability = DRIVES["arm"].stability
+    assert stability is not None
+    lines = {line.what: line for line in stability()}
+    assert {line.status for line in lines.values()} == {"ok"}
+    assert lines["arm, workspace"].found == "0.129 to 1.000"
 
 
 # ------------------------------------------------------------------------------------------------------ the command
