@@ -27,10 +27,9 @@ from artde_gym.robots.arm.panda import panda
 from artde_gym.robots.arm.reader import read_arm
 from artde_gym.robots.arm.reference import reference
 from artde_gym.robots.arm.tool import Tool
-from artde_gym.robots.arm.workspace import smallest_inertia
+from artde_gym.robots.arm.workspace import TIME_STEP, smallest_inertia
 from artde_gym.sim.engine import World
 
-TIME_STEP = 0.001  # s, of the physics
 MAX_SPEED = 200.0  # rad/s or m/s, bound of observed joint speeds; of joints without a limit of their own the fastest
 TURN = 2 * math.pi  # rad, bound of observed angles of joints without limits
 FAR = 10.0  # m, bound of observed positions of the tool
