@@ -61,7 +61,8 @@ def design(
     Of a law that switches with the support phase, print the range of each phase; --json holds, as "gains", the nominal
     inertias that follow from the robot's spec and gait.
     """
-    robot = _robot(robot, env)
+    name = _robot(robot, env)
+    title = ROBOTS[name].title
     if period is not None:
         check_number("period", period, 1e-6, 10.0, "1e-6 to 10 s")
     walk = {"actuator_inertia": actuator_inertia, "speed": speed, "step_duration": step_duration}
@@ -69,7 +70,7 @@ def design(
     arguments = json_object("--env-kwargs", env_kwargs)
     if figure is not None and not figure.name:
         raise OptionError("figure", str(figure), "the path of a file, such as m_bar.svg")
-    if env is not None and DRIVES[NAMES[robot]].workspace is not None:
+    if env is not None and DRIVES[name].workspace is not None:
         show_workspace(env, arguments | given, law, json_object("gains", gains), period, figure, as_json)
         return
     given |= arguments
@@ -77,37 +78,36 @@ def design(
         if figure is not None:
             raise OptionError("figure", str(figure), f"a law with one m_bar: {', '.join(DELAYED)}")
         chosen = json_object("gains", gains)
-        _show_supports(robot, law, design_supports(NAMES[robot], law, preset, cap, gains=chosen, **given), as_json)
+        _show_supports(title, law, design_supports(name, law, preset, cap, gains=chosen, **given), as_json)
         return
-    found = work_out(NAMES[robot], law, preset, period, gains=json_object("gains", gains), **given)
+    found = work_out(name, law, preset, period, gains=json_object("gains", gains), **given)
     if figure is not None:
         for one in found:
             drawing = draw(one).encode()
             write_atomically(_file(figure, one, len(found) > 1), lambda file, drawing=drawing: file.write(drawing))
     if as_json:
-        print(json.dumps({"robot": robot, "law": law, "loops": [one.to_dict() for one in found]}, indent=2))
+        print(json.dumps({"robot": title, "law": law, "loops": [one.to_dict() for one in found]}, indent=2))
         return
     for one in found:
         _print(one, Console())
 
 
 def _robot(robot: str | None, env: str | None) -> str:
-    """Return the title of a robot, given by itself or by an environment.
+    """Return the name of a robot that is given by its title or by an environment.
 
     Raises:
         OptionError: for an unknown one, or both.
     """
-    if env is not None:
-        if robot is not None:
-            raise OptionError("robot", robot, "none with an environment")
-        known = {name: title for title, name in NAMES.items()}
-        if (name := robot_of(env)) not in known:
-            raise OptionError("env", env, f"an environment of {' or '.join(NAMES)}")
-        return known[name]
-    title = "biped" if robot is None else robot
-    if title not in NAMES:
-        raise OptionError("robot", title, ", ".join(map(repr, NAMES)))
-    return title
+    if env is None:
+        title = "biped" if robot is None else robot
+        if title not in NAMES:
+            raise OptionError("robot", title, ", ".join(map(repr, NAMES)))
+        return NAMES[title]
+    if robot is not None:
+        raise OptionError("robot", robot, "none with an environment")
+    if (name := robot_of(env)) not in designed():
+        raise OptionError("env", env, f"an environment of {' or '.join(NAMES)}")
+    return name
 
 
 def draw(one: Design) -> str:
