@@ -71,14 +71,19 @@ def designed(inertia: Array, period: float, level: float = LEVEL) -> ArmGains:
 
 def largest_bandwidth(smallest: float, largest: float, period: float) -> float:
     """Return the omega (rad/s) below which K_p = omega^2, K_d = 2 omega are stable for all eigenvalues in a range."""
-    quick = (math.sqrt(4 + 4 * (2 - largest) / largest) - 2) / period
-    slow = 2 * smallest / ((1 - smallest) * period) if smallest < 1 else math.inf
-    return min(quick, slow)
+    return min(stable_factors(1.0, 2.0, smallest, largest, period))
 
 
-def design_arm(spec: RobotSpec, period: float) -> ArmGains:
-    """Return gains for an arm; warn if it has no reflected inertia."""
-    if not any(spec.armature):
+def stable_factors(k_p: float, k_d: float, smallest: float, largest: float, period: float) -> tuple[float, float]:
+    """Return the factors x at which K_p x^2, K_d x make the largest and the smallest eigenvalue of a range unstable."""
+    quick = (math.sqrt(k_d**2 + k_p * 4 * (2 - largest) / largest) - k_d) / (k_p * period)
+    slow = k_d * smallest / ((1 - smallest) * period * k_p) if smallest < 1 else math.inf
+    return quick, slow
+
+
+def design_arm(spec: RobotSpec, period: float, *, warns: bool = True) -> ArmGains:
+    """Return gains for an arm; warn if it has no reflected inertia, unless told not to."""
+    if warns and not any(spec.armature):
         warnings.warn(
             "the arm has no reflected rotor inertia, as geared arms have: pass armature= (kg m^2) to its environment",
             stacklevel=4,

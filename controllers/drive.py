@@ -10,6 +10,7 @@ from artde_gym.doctor.check_result import CheckResult
 from artde_gym.registry import Registry
 from controllers.loop import Loop, SupportPhase
 from controllers.policies import Policy
+from controllers.workspace_design import WorkspaceDesign
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,6 +41,9 @@ class Drive:
             arguments describe; None if the robot has no such model.
         supports: for `artde-gym design` of laws that switch: lists the phases of support of a stride, which the keyword
             arguments describe; None for a robot that does not walk.
+        workspace: for `artde-gym design` of an environment: called with its nominal robot, the control period (s),
+            gains in place of the designed ones, and the bits of its encoders or None, returns a
+            `controllers.workspace_design.WorkspaceDesign`; None for a robot without a workspace.
         stability: for `artde-gym doctor`: tells whether time-delay estimation converges at the presets; None to judge
             all presets of all loops.
     """
@@ -52,6 +56,7 @@ class Drive:
     feedback: Callable[[Any], dict[str, Any]] | None = None
     loops: Callable[..., list[Loop]] | None = None
     supports: Callable[..., list[SupportPhase]] | None = None
+    workspace: Callable[[Any, float, Mapping[str, Any], float | None], WorkspaceDesign] | None = None
     stability: Callable[[], Sequence[CheckResult]] | None = None
 
 

@@ -17,6 +17,11 @@ def biped(**kwargs: Any) -> Any:
     return gym.make("BipedWalk-Payload-v0", disable_env_checker=True, **{"duration": 6.0, **kwargs}).unwrapped
 
 
+def arm(**kwargs: Any) -> Any:
+    """Return the built-in arm at pick and place."""
+    return gym.make("ArmTrack-Payload-v0", disable_env_checker=True, **{"duration": 12.0, **kwargs}).unwrapped
+
+
 def quadrotor(**kwargs: Any) -> Any:
     """Return the quadrotor."""
     return gym.make("QuadInfinity-Payload-v0", disable_env_checker=True, **kwargs).unwrapped

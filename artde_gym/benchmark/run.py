@@ -11,6 +11,7 @@ from artde_gym.registry import pointed
 
 SECTIONS: dict[str, str] = {
     "walk": "artde_gym.benchmark.walk:walking",
+    "arm": "artde_gym.benchmark.arm:tracking",
     "flight": "artde_gym.benchmark.flight:flying",
     "fleet": "artde_gym.benchmark.flight:fleets",
     "biped-vector": "artde_gym.benchmark.biped_vector:biped_vector",

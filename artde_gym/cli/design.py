@@ -13,25 +13,28 @@ from rich.console import Console
 from rich.table import Table
 
 from artde_gym.arguments import check_number
-from artde_gym.cli.arguments import json_object
+from artde_gym.cli.arguments import EnvKwargs, joined, json_object
+from artde_gym.cli.workspace_design import show_workspace
 from artde_gym.errors import OptionError
-from artde_gym.files import write_atomically
-from artde_gym.kit import ROBOTS
+from artde_gym.evaluation.environments import robot_of
+from artde_gym.files import check_figure, write_atomically
+from artde_gym.kit import ROBOTS, find_robot
 from artde_gym.palette import STYLES
 from artde_gym.report.chart import Axis, Chart
 from controllers.design import DELAYED, Design, designed
 from controllers.design import design as work_out
 from controllers.drive import DRIVES
+from controllers.motion import check_motion
 from controllers.support_design import SWITCHED, SupportDesign, derived_gains, design_supports
 
-NAMES = {ROBOTS[robot].title: robot for robot in designed() if robot in ROBOTS}
-"""Robots by title."""
-WALKERS = [title for title, robot in NAMES.items() if DRIVES[robot].supports is not None]
-CAP = 0.09  # kg m^2
+NAMES = [robot for robot in designed() if robot in ROBOTS]
+"""Robots whose m_bar can be judged."""
 
 
 def design(
-    robot: Annotated[str, typer.Option(help=f"{' or '.join(NAMES)}.")] = "biped",
+    robot: Annotated[str | None, typer.Option(help=f"{' or '.join(NAMES)}. Default: ojas.")] = None,
+    env: Annotated[str | None, typer.Option(help="Environment id, in place of the robot.")] = None,
+    env_kwargs: EnvKwargs = None,
     law: Annotated[str, typer.Option(help=f"{', '.join((*DELAYED, *SWITCHED))}.")] = "tde",
     preset: Annotated[str | None, typer.Option(help="Preset of the law's gains; see `list controllers`.")] = None,
     gains: Annotated[str | None, typer.Option(help='JSON; override gains of the preset, e.g. {"m_bar": 0.08}.')] = None,
@@ -44,10 +47,14 @@ def design(
     motion: Annotated[str | None, typer.Option(help="JSON; arguments of another robot's motion.")] = None,
     cap: Annotated[
         float | None,
-        typer.Option(help=f"Laws that switch: largest eigenvalue of what is derived (kg m^2). Default: {CAP:g}."),
+        typer.Option(help="Laws that switch: largest eigenvalue of what is derived (kg m^2). Default: 0.09."),
     ] = None,
     figure: Annotated[
-        Path | None, typer.Option(help="SVG file for the limit along the reference, one per loop.")
+        Path | None,
+        typer.Option(
+            help="SVG file for the limit along the reference, one per loop; of an arm for the eigenvalues over its "
+            "workspace."
+        ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
@@ -56,41 +63,59 @@ def design(
     Of a law that switches with the support phase, print the range of each phase; --json holds, as "gains", the nominal
     inertias that follow from the robot's spec and gait.
     """
-    if robot not in NAMES:
-        raise OptionError("robot", robot, ", ".join(map(repr, NAMES)))
+    name = _robot(robot, env)
+    switches = law in SWITCHED
+    _refuse_idle(switches, period, cap, figure)
     if period is not None:
         check_number("period", period, 1e-6, 10.0, "1e-6 to 10 s")
-    walk = {"actuator_inertia": actuator_inertia, "speed": speed, "step_duration": step_duration}
-    given = {name: value for name, value in walk.items() if value is not None} | json_object("--motion", motion)
-    if law in SWITCHED:
-        _refuse_one_inertia(robot, {"figure": figure, "period": period})
-        chosen = json_object("gains", gains)
-        judged = design_supports(NAMES[robot], law, preset, CAP if cap is None else cap, gains=chosen, **given)
-        _show_supports(robot, law, judged, as_json)
-        return
-    if cap is not None:
-        raise OptionError("cap", cap, f"with a law that switches: {', '.join(SWITCHED)}")
-    found = work_out(NAMES[robot], law, preset, period, gains=json_object("gains", gains), **given)
     if figure is not None:
-        if not figure.name:
-            raise OptionError("figure", str(figure), "the path of a file, such as m_bar.svg")
+        check_figure("figure", figure)
+    walk = {"actuator_inertia": actuator_inertia, "speed": speed, "step_duration": step_duration}
+    given = joined("--motion", json_object("--motion", motion), {k: v for k, v in walk.items() if v is not None})
+    given = joined("--env-kwargs", json_object("--env-kwargs", env_kwargs), given)
+    chosen = json_object("gains", gains)
+    if env is not None and DRIVES[name].workspace is not None:
+        show_workspace(env, given, law, chosen, period, figure, as_json)
+        return
+    check_motion(name, (DRIVES[name].supports if switches else DRIVES[name].loops) or dict, given)
+    if switches:
+        limit = {} if cap is None else {"cap": cap}
+        _show_supports(name, law, design_supports(name, law, preset, **limit, gains=chosen, **given), as_json)
+        return
+    found = work_out(name, law, preset, period, gains=chosen, **given)
+    if figure is not None:
         for one in found:
             drawing = draw(one).encode()
             write_atomically(_file(figure, one, len(found) > 1), lambda file, drawing=drawing: file.write(drawing))
     if as_json:
-        print(json.dumps({"robot": robot, "law": law, "loops": [one.to_dict() for one in found]}, indent=2))
+        print(json.dumps({"robot": name, "law": law, "loops": [one.to_dict() for one in found]}, indent=2))
         return
     for one in found:
         _print(one, Console())
 
 
-def _refuse_one_inertia(robot: str, options: dict[str, Any]) -> None:
-    """Raise OptionError for a robot that does not walk, and for options that a law which switches does not have."""
-    if robot not in WALKERS:
-        raise OptionError("robot of a law that switches", robot, ", ".join(map(repr, WALKERS)))
-    for name, value in options.items():
-        if value is not None:
+def _robot(robot: str | None, env: str | None) -> str:
+    """Return the name of a robot that is given as such or by an environment.
+
+    Raises:
+        OptionError: for an unknown one, or both.
+    """
+    if env is None:
+        return find_robot("ojas" if robot is None else robot, NAMES).name
+    if robot is not None:
+        raise OptionError("robot", robot, "none with an environment")
+    if (name := robot_of(env)) not in NAMES:
+        raise OptionError("env", env, f"an environment of {' or '.join(NAMES)}")
+    return name
+
+
+def _refuse_idle(switches: bool, period: float | None, cap: float | None, figure: Path | None) -> None:
+    """Raise OptionError for an option that would do nothing with such a law."""
+    for name, value in (("figure", figure), ("period", period)):
+        if switches and value is not None:
             raise OptionError(name, str(value), f"with a law of one m_bar: {', '.join(DELAYED)}")
+    if not switches and cap is not None:
+        raise OptionError("cap", cap, f"with a law that switches: {', '.join(SWITCHED)}")
 
 
 def draw(one: Design) -> str:

@@ -51,8 +51,8 @@ class Effects:
         entries = [
             (name, number, self._numbers(name, entry))
             for name, value in sampled.items()
-            if DISTURBANCES[name].effect is not None
             for number, entry in enumerate(value if DISTURBANCES[name].multiple else (value,))
+            if DISTURBANCES[name].acts(entry)
         ]
         if entries or self._sampled[robot]:
             self._sampled[robot], self._groups = entries, None

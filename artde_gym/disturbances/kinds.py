@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Any
 
 from artde_gym.deprecation import renamed_arguments
+from artde_gym.disturbances.friction import TERMS, friction
 from artde_gym.disturbances.loads import Effect
 from artde_gym.errors import OptionError
 from artde_gym.kit import ROBOTS, Capability
@@ -60,6 +61,7 @@ class DisturbanceSpec:
         multiple: True if it takes a list of entries. For a joint, "all" means one entry per joint.
         one_of: parameters of which exactly one is given; the others are absent.
         effect: function that computes its loads; None for a kind that environments implement themselves.
+        terms: parameters that are all zero where there is no effect; () for a kind that always has one.
     """
 
     name: str
@@ -70,6 +72,11 @@ class DisturbanceSpec:
     multiple: bool = False
     one_of: tuple[str, ...] = ()
     effect: Effect | None = None
+    terms: tuple[str, ...] = ()
+
+    def acts(self, entry: Mapping[str, Any]) -> bool:
+        """Return True if a sampled entry has an effect."""
+        return self.effect is not None and (not self.terms or any(entry[term] for term in self.terms))
 
     def parameters_for(self, robot: str | None) -> tuple[Parameter, ...]:
         """Return the parameters that a robot supports, or all for no particular robot (None)."""
@@ -357,10 +364,22 @@ OWN: dict[str, DisturbanceSpec] = {
         ),
         DisturbanceSpec(
             "joint_friction",
-            "The joints' friction is larger or smaller than that of the nominal model.",
-            (Parameter("scale", "1", 0.0, 10.0, None, "true over nominal viscous and dry friction"),),
+            "More friction in each joint than in the nominal model, viscous, Coulomb and Stribeck; see "
+            "`artde_gym.disturbances.friction`. Where joints have some already, `scale` makes that larger or smaller.",
+            (
+                Parameter(
+                    "scale", "1", 0.0, 10.0, 1.0, "true over nominal viscous and dry friction", requires="friction"
+                ),
+                Parameter("viscous", "Nm s/rad", 0.0, 100.0, 0.0, "added viscous friction (N s/m of a sliding joint)"),
+                Parameter("coulomb", "Nm", 0.0, 100.0, 0.0, "added dry friction (N of a sliding joint)"),
+                Parameter("stribeck", "Nm", 0.0, 100.0, 0.0, "by how much dry friction is larger at rest"),
+                Parameter("stribeck_velocity", "rad/s", 1e-3, 10.0, 0.1, "speed at which that has fallen to 37 %"),
+                Parameter("slip", "rad/s", 1e-3, 1.0, 0.05, "speed at which dry friction reaches 76 % of its size"),
+            ),
             shorthand="scale",
-            requires="friction",
+            requires="joints",
+            effect=friction,
+            terms=TERMS,
         ),
         DisturbanceSpec(
             "torque_limit",

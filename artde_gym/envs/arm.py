@@ -84,6 +84,7 @@ class ArmTrackEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any]]):
         robot: str | os.PathLike[str] = "panda",
         tip: str | None = None,
         armature: float | Sequence[float] | None = None,
+        joints: Sequence[str] | None = None,
         reference: Any = PICK,
         disturbances: Mapping[str, Any] | None = None,
         control_period: float = 0.001,
@@ -96,7 +97,7 @@ class ArmTrackEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any]]):
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise OptionError("render_mode", render_mode, "None, 'rgb_array'")
         self.render_mode = render_mode
-        tracking = self._tracking = task.Tracking.of(robot, tip, armature, reference, control_period, duration)
+        tracking = self._tracking = task.Tracking.of(robot, tip, armature, joints, reference, control_period, duration)
         spec = self.nominal_robot = tracking.nominal_robot
         self.control_period, self.reference = tracking.control_period, reference
         self._disturbances = tracking.parse(DISTURBANCES if disturbances is None else disturbances)

@@ -77,6 +77,7 @@ class ArmTrackVectorEnv(BaseVectorEnv):
         robot: str | os.PathLike[str] = "panda",
         tip: str | None = None,
         armature: float | Sequence[float] | None = None,
+        joints: Sequence[str] | None = None,
         reference: Any = PICK,
         disturbances: Mapping[str, Any] | None = None,
         control_period: float = 0.001,
@@ -89,7 +90,7 @@ class ArmTrackVectorEnv(BaseVectorEnv):
     ) -> None:
         if isinstance(threads, bool) or not (isinstance(threads, int) and threads >= 1):
             raise OptionError("threads", threads, "a whole number >= 1")
-        tracking = self._tracking = task.Tracking.of(robot, tip, armature, reference, control_period, duration)
+        tracking = self._tracking = task.Tracking.of(robot, tip, armature, joints, reference, control_period, duration)
         spec = self.nominal_robot = tracking.nominal_robot
         self.observation_layout, self.action_layout = task.observation_layout(spec), task.action_layout(spec)
         self.metrics_spec = task.metrics_spec(spec)

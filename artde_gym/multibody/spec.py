@@ -44,7 +44,8 @@ class Link:
         mass: kg, above zero; a mere frame has neither mass nor inertia, a link on a fixed joint may lack a mass.
         com: center of mass in the link frame (m).
         inertia: moments about the center of mass, along the link's axes (kg m^2); with `products` the principal ones
-            must satisfy the triangle inequality, or engines discard the whole tensor.
+            must satisfy the triangle inequality, or engines discard the whole tensor. Only the base's must be above
+            zero: a point or a rod may be a part of a body, but not move alone, see `RobotSpec.merged`.
         parent: name of the parent link; None for the base.
         origin: origin of the joint in the parent link's frame (m).
         axis: axis of the joint in the link frame (unit vector); None for a fixed joint.
@@ -85,9 +86,10 @@ class Link:
         held = self.axis is None and self.parent is not None
         if not (math.isfinite(self.mass) and (self.mass > 0 or (held and self.mass == 0))):
             raise RobotError(f"mass of link {self.name!r}", self.mass, "a finite number > 0 kg")
-        smallest, middle, largest = self._principal()
-        if not (smallest > 0 and smallest + middle >= largest and math.isfinite(largest)):
-            allowed = "three moments > 0 kg m^2 that satisfy the triangle inequality"
+        smallest, middle, largest = self.principal
+        positive = smallest >= -ROUNDING * largest if self.parent is not None else smallest > 0
+        if not (positive and smallest + middle >= largest and math.isfinite(largest)):
+            allowed = "three moments, not negative, that satisfy the triangle inequality (kg m^2)"
             raise RobotError(f"inertia of link {self.name!r}", (*self.inertia, *self.products), allowed)
 
     @property
@@ -101,8 +103,9 @@ class Link:
         """True if the tensor is diagonal and the link's frame has the parent's orientation at the zero position."""
         return self.rotation is None and not any(self.products)
 
-    def _principal(self) -> list[float]:
-        """Return the principal moments in ascending order (kg m^2); rounding may break their triangle inequality."""
+    @property
+    def principal(self) -> list[float]:
+        """Principal moments in ascending order (kg m^2); rounding may break their triangle inequality."""
         if not any(self.products):
             return sorted(self.inertia)
         if not np.isfinite(self.tensor).all():
@@ -201,7 +204,11 @@ class RobotSpec:
         return high - low
 
     def merged(self) -> RobotSpec:
-        """Merge links on fixed joints into their parents, so that there are fewer to simulate."""
+        """Merge links on fixed joints into their parents, so that there are fewer to simulate.
+
+        Raises:
+            RobotError: for a body that moves with a mass, but without inertia about some axis.
+        """
         carrier: dict[str, tuple[str, np.ndarray, np.ndarray | None]] = {}
         parts: dict[str, list[_Part]] = {}
         for link in self.links:
@@ -219,6 +226,9 @@ class RobotSpec:
                 parent, origin, rotation = _placed(carrier[link.parent], link.origin, link.rotation)
                 link = dataclasses.replace(link, parent=parent, origin=_vector(origin), rotation=_rows(rotation))
             links.append(_merge(link, group) if len(group) > 1 else link)
+            if link.axis is not None and links[-1].mass > 0 and not links[-1].principal[0] > 0:
+                allowed = "three principal moments > 0 kg m^2, of it and of links fixed to it"
+                raise RobotError(f"inertia of link {name!r}", (*links[-1].inertia, *links[-1].products), allowed)
         moved = ((site, _placed(carrier[link], point, None)) for site, link, point in self.sites)
         sites = tuple((site, name, _vector(point)) for site, (name, point, _) in moved)
         load = carrier[self.carrier][0] if self.carrier else ""

@@ -1,7 +1,8 @@
 """URDF files of users as trees of links, read with the standard library alone.
 
-Meshes, materials, transmissions and extensions are ignored: they do not move. Every link, joint, parent, inertia, limit
-and axis is checked.
+Meshes, materials and extensions are ignored: they do not move. Every link, joint, parent, inertia, limit and axis is
+checked. URDF itself has no reflected inertia of rotors; Drake's extension of transmissions is read, rotor_inertia times
+the square of gear_ratio.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from artde_gym.errors import RobotError, suggest_names
 from artde_gym.multibody.model_file import FileJoint, FileLink, ModelTree, check_links, check_name
 
 KINDS = ("fixed", "revolute", "continuous", "prismatic")
+DRAKE = "{http://drake.mit.edu}"
 TENSOR = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
@@ -28,8 +30,24 @@ def read_urdf(root: ET.Element, file: str) -> ModelTree:
     """
     links, joints = _named(root, "link", file), _named(root, "joint", file)
     check_links(len(links), file)
-    above = _parents(links, joints, file)
-    return ModelTree(file, tuple(_link(links[name], above.get(name), file) for name in _in_order(links, above, file)))
+    above, armature = _parents(links, joints, file), _armatures(root, file)
+    order = _in_order(links, above, file)
+    return ModelTree(file, tuple(_link(links[name], above.get(name), armature, file) for name in order))
+
+
+def _armatures(root: ET.Element, file: str) -> dict[str, float]:
+    """Return the reflected inertia of joints whose transmission has one (kg m^2 or kg)."""
+    found: dict[str, float] = {}
+    for transmission in root.iter("transmission"):
+        joint, actuator = transmission.find("joint"), transmission.find("actuator")
+        if joint is None or actuator is None:
+            continue
+        where = f"transmission of joint {joint.get('name')!r} in {file}"
+        rotor, ratio = (actuator.find(f"{DRAKE}{name}") for name in ("rotor_inertia", "gear_ratio"))
+        if rotor is not None:
+            gears = 1.0 if ratio is None else _number(ratio, "value", None, where)
+            found[str(joint.get("name"))] = _not_negative(rotor, "value", where) * gears**2
+    return found
 
 
 def _named(root: ET.Element, tag: str, file: str) -> dict[str, ET.Element]:
@@ -81,14 +99,19 @@ def _in_order(links: Mapping[str, ET.Element], above: Mapping[str, tuple[str, ET
     return order
 
 
-def _link(element: ET.Element, above: tuple[str, ET.Element] | None, file: str) -> FileLink:
+def _link(
+    element: ET.Element, above: tuple[str, ET.Element] | None, armature: Mapping[str, float], file: str
+) -> FileLink:
     name = str(element.get("name"))
     mass, com, inertia = _inertial(element.find("inertial"), f"inertial of link {name!r} in {file}")
     if above is None:
         return FileLink(name, None, np.zeros(3), np.eye(3), mass, com, inertia)
     parent, joint = above
     where = f"joint {joint.get('name')!r} in {file}"
-    return FileLink(name, parent, *_frame(joint, where), mass, com, inertia, _joint(joint, where))
+    moved = _joint(joint, where)
+    if moved is not None:
+        moved = moved._replace(armature=armature.get(moved.name, 0.0))
+    return FileLink(name, parent, *_frame(joint, where), mass, com, inertia, moved)
 
 
 def _inertial(element: ET.Element | None, where: str) -> tuple[float, np.ndarray, np.ndarray]:

@@ -15,7 +15,10 @@ def conditions_of(robot: str) -> list[str]:
     return [
         kind.name
         for kind in in_order()
-        if kind.shorthand is not None and not kind.multiple and kind.name != PAYLOAD and kind.honored_by(robot)
+        if kind.shorthand in [one.name for one in kind.parameters_for(robot)]
+        and not kind.multiple
+        and kind.name != PAYLOAD
+        and kind.honored_by(robot)
     ]
 
 

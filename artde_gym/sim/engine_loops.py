@@ -28,9 +28,10 @@ def joint_loop(engine: Engine) -> Callable[[Array], Any]:
 
         return in_bullet
     mj, model, data, joints = _mujoco(engine)
+    torques = data.qfrc_applied[0 if engine.spec.fixed else 6 :]
 
     def in_mujoco(tau: Array) -> Any:
-        data.qfrc_applied[6:][joints] = tau
+        torques[joints] = tau
         mj.mj_step(model, data)
         return data.qpos.copy(), data.qvel.copy()
 

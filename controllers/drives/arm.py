@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from artde_gym.doctor.check_result import CheckResult
 from artde_gym.multibody.dynamics import RigidBodyTree
 from artde_gym.robots.arm.panda import panda
 from artde_gym.robots.arm.reference import PICK, TIMES, reference
 from controllers.arm_design import design_arm
+from controllers.design import preset_designs
 from controllers.drive import Drive, Preset, Ranges
 from controllers.joint_space import make_joint_space
 from controllers.laws.artde import ArtdeGains
@@ -19,6 +21,8 @@ from controllers.laws.computed_torque import ComputedTorqueGains
 from controllers.laws.tde import ConstantGains, TdeGains
 from controllers.loop import Loop
 from controllers.policies import ControlInterface, TrackingPolicy
+from controllers.stability_check import REMEDY, judged
+from controllers.workspace_design import workspace_design
 
 PERIOD = 0.001  # s
 _SAMPLES = 200  # of the reference
@@ -54,6 +58,22 @@ def loops() -> list[Loop]:
     return [Loop("joints", spec.actuated, "kg m^2", time, inertia)]
 
 
+def stability() -> list[CheckResult]:
+    """Judge the presets along pick and place, and the design in all poses."""
+    (loop,) = loops()
+    valid, found = judged(preset_designs(loop, DRIVE))
+    whole = workspace_design(panda(), PERIOD, {})
+    low, high = whole.eigenvalues.min(), whole.eigenvalues.max()
+    return [
+        _result("arm, joints", valid, found),
+        _result("arm, workspace", whole.valid, f"{low:.3f} to {high:.3f}"),
+    ]
+
+
+def _result(what: str, valid: bool, found: str) -> CheckResult:
+    return CheckResult(what, "ok", found) if valid else CheckResult(what, "failed", found, REMEDY)
+
+
 def _presets() -> dict[tuple[str, str], Preset]:
     """Return the gains of the built-in arm at 1 ms; `make_arm` designs those of others."""
     feedback = design_arm(panda(), PERIOD)
@@ -87,4 +107,14 @@ RANGES: dict[str, Ranges] = {
     "artde": {**_ROBUST_TERM, "gamma_1": (10.0, 5000.0)},
     "computed-torque": _FEEDBACK,
 }
-DRIVE = Drive("arm", _presets(), RANGES, make=make_arm, period=PERIOD, loops=loops, feedback=feedback)
+DRIVE = Drive(
+    "arm",
+    _presets(),
+    RANGES,
+    make=make_arm,
+    period=PERIOD,
+    loops=loops,
+    workspace=workspace_design,
+    stability=stability,
+    feedback=feedback,
+)

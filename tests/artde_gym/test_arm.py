@@ -1,6 +1,7 @@
 """`ArmTrack-Payload-v0`: references, friction, equilibrium, both engines, batches, designed gains on unknown files."""
 
 import copy
+import dataclasses
 import math
 import warnings
 from pathlib import Path
@@ -17,8 +18,10 @@ from artde_gym.errors import DisturbanceError, OptionError, RobotError
 from artde_gym.motion.scene import scene_of
 from artde_gym.multibody.dynamics import RigidBodyTree
 from artde_gym.robots.arm.panda import panda
-from artde_gym.robots.arm.reference import MULTI_SINE, PICK, reference
+from artde_gym.robots.arm.reader import read_arm
+from artde_gym.robots.arm.reference import FIGURE_EIGHT, KINDS, PICK, RISE, home, reference
 from artde_gym.robots.arm.task import Tracking
+from artde_gym.robots.arm.tool import Tool
 from artde_gym.robots.arm.workspace import workspace_inertia
 from controllers.arm_design import LEVEL, design_arm, designed, largest_bandwidth
 from controllers.laws.errors import GainError
@@ -80,7 +83,9 @@ def test_the_built_in_arm_is_that_of_its_publications():
     assert spec.mass == pytest.approx(4.970684 + 0.646926 + 3.228604 + 3.587895 + 1.225946 + 1.666555 + 0.735522)
     assert spec.torque_limits == (87.0,) * 4 + (12.0,) * 3
     # with all angles at zero the flange is .088 m ahead and .333 + .316 + .384 - .107 m above the base
-    tool = Tracking.of("panda", None, None, {"times": [0, 1], "points": [[0, 0, 0, -0.1, 0, 0.1, 0]] * 2}, 0.001, 0.1)
+    tool = Tracking.of(
+        "panda", None, None, None, {"times": [0, 1], "points": [[0, 0, 0, -0.1, 0, 0.1, 0]] * 2}, 0.001, 0.1
+    )
     tree, q = RigidBodyTree(spec), np.zeros(7)
     found = tree.position("joint7", q) + tree.rotation("joint7", q) @ np.asarray(tool.tool_point)
     np.testing.assert_allclose(found, (0.088, 0.0, 0.333 + 0.316 + 0.384 - 0.107), atol=1e-12)
@@ -95,7 +100,7 @@ def test_the_built_in_arm_agrees_with_pinocchio(judge):
         np.testing.assert_allclose(*forces, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("kind", [PICK, MULTI_SINE])
+@pytest.mark.parametrize("kind", KINDS)
 def test_references_are_smooth_and_begin_at_rest(kind):
     time = 1e-3 * np.arange(12_001)
     found = reference(panda(), kind, time)
@@ -105,6 +110,20 @@ def test_references_are_smooth_and_begin_at_rest(kind):
     np.testing.assert_allclose(found.qdd[0], 0.0, atol=1e-15)
     fastest = [panda().by_name[name].speed for name in panda().actuated]
     assert (np.abs(found.qd).max(axis=0) < fastest).all()
+
+
+def test_the_tool_draws_a_figure_eight(tmp_path):
+    """Eased in, at its place to a micrometer, the same in each round; also of an arm with a sliding joint."""
+    crane, pose = read_arm(small_arm(tmp_path)), [0.2, -0.4, 0.3]
+    time = 0.01 * np.arange(1001)
+    for spec, given in ((panda(), FIGURE_EIGHT), (crane, {"size": [0.15, 0.08], "period": 4.0, "pose": pose})):
+        found = reference(spec, given, time)
+        np.testing.assert_allclose(found.q[0], home(spec) if spec == panda() else pose, atol=1e-12)
+        place, phase = Tool(spec).position(found.q), 2 * np.pi / 4.0 * (time - RISE / 2)
+        eight = np.stack([0 * time, 0.15 * np.sin(phase), 0.08 * np.sin(2 * phase)], axis=1)
+        late = time >= RISE
+        np.testing.assert_allclose((place - place[0])[late], eight[late], atol=1e-6)
+        np.testing.assert_allclose(found.q[400], found.q[800], atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -118,6 +137,11 @@ def test_references_are_smooth_and_begin_at_rest(kind):
         {"times": [0, 1], "points": "here"},
         {"amplitude": -1.0, "frequency": 0.2},
         {"amplitude": 3.0, "frequency": 0.2},
+        {"size": [0.1], "period": 4.0},
+        {"size": [0.1, 0.1], "period": 0.0},
+        {"size": [0.1, 0.1], "period": 4.0, "pose": [0.0]},
+        {"size": [1.5, 1.5], "period": 4.0},
+        {"size": [0.1, 0.1], "period": 4.0, "speed": 1.0},
         {"amplitude": math.nan, "frequency": 0.2},
     ],
 )
@@ -152,7 +176,7 @@ def test_the_arm_starts_in_equilibrium(engine_name):
 
 
 def test_friction_takes_energy_and_scales():
-    task = Tracking.of("panda", None, None, PICK, 0.001, 1.0)
+    task = Tracking.of("panda", None, None, None, PICK, 0.001, 1.0)
     qd = np.random.default_rng(0).normal(size=(20, 7))
     torque = task.friction(1.0, qd)
     assert (torque * qd < 0).all()
@@ -240,6 +264,55 @@ def test_limits_of_position_end_an_episode():
 def test_impossible_arguments_are_refused(arguments, error):
     with pytest.raises(error):
         make(**arguments)
+
+
+def test_an_arm_with_the_names_of_the_built_in_one_has_its_own_home():
+    links = (dataclasses.replace(link, limits=(0.5, 1.5)) if link.axis else link for link in panda().links)
+    np.testing.assert_allclose(home(dataclasses.replace(panda(), links=tuple(links))), 1.0)
+
+
+@pytest.mark.parametrize("chosen", [["turn", "lift"], ["reach", "lift"], ["lift"]])
+def test_some_joints_move_and_the_others_are_locked(tmp_path, chosen):
+    """The whole arm with its other joints at zero has the same dynamics and the same tool."""
+    file = small_arm(tmp_path)
+    spec, whole = read_arm(file, joints=chosen, tip="d", armature=0.2), RigidBodyTree(read_arm(file, armature=0.2))
+    assert spec.actuated == tuple(name for name in ("turn", "lift", "reach") if name in chosen)
+    moving = [whole.joints.index(name) for name in spec.actuated]
+    ours, rng = RigidBodyTree(spec), np.random.default_rng(0)
+    for _ in range(10):
+        q, qd, qdd = np.zeros((3, 3))
+        q[moving], qd[moving], qdd[moving] = rng.normal(size=(3, len(moving)))
+        torques = whole.joint_torques(q, qd, qdd)[moving]
+        np.testing.assert_allclose(ours.joint_torques(q[moving], qd[moving], qdd[moving]), torques, atol=1e-10)
+    assert read_arm(file, joints=["turn"]).sites[0][:2] == ("tool", "turn")
+
+
+def test_an_arm_with_locked_joints_is_tracked_alike_in_a_vector(tmp_path):
+    arguments = {"robot": str(small_arm(tmp_path)), "joints": ["turn", "reach"], "armature": 0.2, "duration": 0.1}
+    arguments |= {"engine": "mujoco", "disturbances": {}}
+    env, envs = gym.make(ID, **arguments), gym.make_vec(ID, 2, "vector_entry_point", **arguments)
+    assert env.action_space.shape == (2,)
+    seen = run(env)
+    policy, state, (observations, _) = controllers.make("tde", envs), None, envs.reset(seed=3)
+    for row in seen[1:]:
+        actions, state = policy.predict(observations, state)
+        observations, *_ = envs.step(actions)
+        np.testing.assert_array_equal(observations[0], row)
+    env.close()
+    envs.close()
+
+
+@pytest.mark.parametrize("joints", [[], ["turn", "turn"], ["swing"], "turn", 3, [1], [["turn"]]])
+def test_impossible_joints_are_refused(tmp_path, joints):
+    with pytest.raises(RobotError, match="joint"):
+        make(robot=small_arm(tmp_path), joints=joints)
+
+
+def test_joints_have_to_lie_on_the_way_to_the_tip(tmp_path):
+    with pytest.raises(RobotError, match="on the way"):
+        make(robot=small_arm(tmp_path), joints=["turn", "reach"], tip="c")
+    with pytest.raises(OptionError, match="joints"):
+        make(joints=["joint1"])
 
 
 # ----------------------------------------------------------------------------------------------------------- design

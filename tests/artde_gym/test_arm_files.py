@@ -155,6 +155,43 @@ def test_a_gripper_is_locked_where_it_may_be(tmp_path):
     assert read_arm(tmp_path / "robot.xml", tip="c").actuated == ("j", "l")
 
 
+def test_rotor_inertia_of_a_transmission_is_reflected_through_its_gear(tmp_path):
+    """Drake's extension: rotor_inertia times the square of gear_ratio, the ratio 1 by default."""
+    gear = '<transmission><joint name="{0}"/><actuator name="m">{1}</actuator></transmission>'
+    rotor = '<drake:rotor_inertia value="{0}"/>'
+    geared = gear.format("j", rotor.format(3e-5) + '<drake:gear_ratio value="100"/>')
+    parts = (*map(link, "abcd"), joint("j", "a", "b"), joint("k", "b", "c"), joint("l", "c", "d"))
+    text = robot(*parts, geared, gear.format("k", rotor.format(0.2)), gear.format("l", ""))
+    text = text.replace("<robot ", '<robot xmlns:drake="http://drake.mit.edu" ')
+    assert read_arm(written(tmp_path, text)).armature == pytest.approx((0.3, 0.2, 0.0))
+    with pytest.raises(RobotError, match="value of transmission of joint 'j'"):
+        read_arm(written(tmp_path, text.replace("3e-05", "-1")))
+
+
+def test_points_and_rods_are_parts_of_bodies(tmp_path):
+    point = "<inertial>" + INERTIA.replace('"0.01"', '"0"') + "</inertial>"
+    parts = (link("a"), link("b"), link("c", point), joint("j", "a", "b"), joint("k", "b", "c", "fixed"))
+    spec = read_arm(written(tmp_path, robot(*parts)))
+    np.testing.assert_allclose(spec.by_name["j"].inertia, (0.01 + 0.3**2 / 2, 0.01 + 0.3**2 / 2, 0.01))
+    lone = robot(link("a"), link("b", point), joint("j", "a", "b"))
+    with pytest.raises(RobotError, match=r"inertia of link 'j' in robot\.xml"):
+        read_arm(written(tmp_path, lone))
+
+
+def test_links_that_never_move_need_no_possible_inertia(tmp_path):
+    wrong = BODY.replace('izz="0.01"', 'izz="1"')
+    parts = (link("a"), link("aside", wrong), link("b"), joint("i", "a", "aside"), joint("j", "a", "b"))
+    assert read_arm(written(tmp_path, robot(*parts)), tip="b").mass == 1.0
+    with pytest.raises(RobotError, match="inertia of link 'aside'"):
+        read_arm(tmp_path / "robot.xml", tip="aside")
+
+
+def test_a_base_that_branches_names_its_ends(tmp_path):
+    text = robot(*map(link, "abcd"), joint("i", "a", "b"), joint("j", "a", "c"), joint("k", "c", "d"))
+    with pytest.raises(RobotError, match="such as the ends 'd', 'b'"):
+        read_arm(written(tmp_path, text))
+
+
 @pytest.mark.parametrize(
     "file", ["nowhere.stl", "package://x_description/b.dae", "../../../../etc/passwd", "/dev/zero"]
 )

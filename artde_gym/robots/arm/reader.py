@@ -15,19 +15,23 @@ from artde_gym.sim.mjcf_reader import read_mjcf
 
 
 def read_arm(
-    path: str | os.PathLike[str], *, tip: str | None = None, armature: float | Sequence[float] | None = None
+    path: str | os.PathLike[str],
+    *,
+    tip: str | None = None,
+    armature: float | Sequence[float] | None = None,
+    joints: Sequence[str] | None = None,
 ) -> RobotSpec:
     """Read an arm on a fixed base; no engine reads the file itself, and meshes are ignored.
 
     Args:
         path: URDF or MJCF file, recognized by its root element.
-        tip: see `artde_gym.multibody.manipulator.manipulator`, also for `armature`.
+        tip: see `artde_gym.multibody.manipulator.manipulator`, also for `armature` and `joints`.
 
     Raises:
         RobotError: for a file that is broken or has what cannot be simulated; it names file, element and what is
             allowed.
     """
-    return manipulator(read_tree(Path(path)), tip=tip, armature=armature)
+    return manipulator(read_tree(Path(path)), tip=tip, armature=armature, joints=joints)
 
 
 def read_tree(path: Path) -> ModelTree:

@@ -1,7 +1,8 @@
-"""References of joints as data: way-points with minimum jerk, and sums of sines.
+"""References of joints as data: way-points with minimum jerk, sums of sines, and a figure-eight of the tool.
 
     {"times": [0, 2, 3, 5], "points": [[...], ...]}  at rest in each point (rad or m), minimum jerk between them
     {"amplitude": 0.3, "frequency": 0.2}             two sines about the home pose, one value or one for each joint
+    {"size": [0.15, 0.08], "period": 4}              a figure-eight of the tool (m, s) about the home pose, or {"pose"}
 
 Source of the minimum jerk: Flash and Hogan, Journal of Neuroscience 5 (1985) 1688-1703, s(x) = 10 x^3 - 15 x^4 + 6 x^5.
 """
@@ -13,13 +14,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from artde_gym.arguments import check_number
 from artde_gym.arrays import Array
 from artde_gym.errors import OptionError
 from artde_gym.multibody.spec import RobotSpec
-from artde_gym.robots.arm.panda import HOME, NAMES
+from artde_gym.robots.arm.figure_eight import figure_eight
+from artde_gym.robots.arm.panda import HOME, panda
 
-PICK, MULTI_SINE = "pick-and-place", "multi-sine"
-KINDS = (PICK, MULTI_SINE)
+PICK, MULTI_SINE, FIGURE_EIGHT = "pick-and-place", "multi-sine", "figure-eight"
+KINDS = (PICK, MULTI_SINE, FIGURE_EIGHT)
+EIGHT: dict[str, Any] = {"size": [0.15, 0.08], "period": 4.0}
 TIMES = (0.0, 3.5, 4.5, 7.5, 8.5, 11.5)
 """Of the way-points of pick and place: home, at the load twice, at its place twice, home (s)."""
 GRASP, RELEASE = 4.0, 8.0  # s
@@ -32,7 +36,7 @@ PEAK = 1.875  # largest speed of minimum jerk over the mean
 
 _TO_PICK = (1.0, 0.8, -0.5, 0.6, 0.5, -0.6, 0.7)
 _TO_PLACE = (-1.0, 0.7, 0.5, 0.8, -0.5, -0.4, -0.7)
-_ALLOWED = f'{", ".join(map(repr, KINDS))}, {{"times", "points"}}, {{"amplitude", "frequency"}}'
+_ALLOWED = f'{", ".join(map(repr, KINDS))}, {{"times", "points"}}, {{"amplitude", "frequency"}}, {{"size", "period"}}'
 
 
 class Reference(NamedTuple):
@@ -45,7 +49,7 @@ class Reference(NamedTuple):
 
 def home(spec: RobotSpec) -> Array:
     """Return the pose in the middle of the limits (n,); of the Panda one with a bent elbow."""
-    if spec.actuated == NAMES:
+    if spec == panda():  # another arm's joints may have the same names
         return np.array(HOME)
     return np.array([(low + high) / 2 if np.isfinite(low + high) else 0.0 for low, high in _limits(spec)])
 
@@ -60,6 +64,10 @@ def reference(spec: RobotSpec, given: Any, time: Array) -> Reference:
         found = _way_points(spec, given["times"], given["points"], time)
     elif isinstance(given, Mapping) and given.keys() == {"amplitude", "frequency"}:
         found = _sines(spec, given["amplitude"], given["frequency"], time)
+    elif isinstance(given, Mapping) and {"size", "period"} <= given.keys() <= {"size", "period", "pose"}:
+        found = _eight(spec, time, **given)
+    elif given == FIGURE_EIGHT:
+        found = _eight(spec, time, **EIGHT)
     elif given == PICK:
         found = _way_points(spec, TIMES, _pick_and_place(spec), time)
     elif given == MULTI_SINE:
@@ -133,6 +141,17 @@ def _sines(spec: RobotSpec, amplitude: Any, frequency: Any, time: Array) -> Refe
     q = home(spec) + size * rise * wave
     qd = size * (rise_1 * wave + rise * wave_1)
     return Reference(q, qd, size * (rise_2 * wave + 2 * rise_1 * wave_1 + rise * wave_2))
+
+
+def _eight(spec: RobotSpec, time: Array, size: Any, period: Any, pose: Any = None) -> Reference:
+    axes, center = _array("size", size), home(spec) if pose is None else _array("pose", pose)
+    if axes.shape != (2,) or (axes < 0).any():
+        raise OptionError("size of the reference", size, "two numbers >= 0 (m), across and up")
+    if center.shape != (len(spec.actuated),):
+        raise OptionError("pose of the reference", pose, f"{len(spec.actuated)} numbers")
+    seconds = check_number("period of the reference", period, 0.1, 1000.0, "0.1 to 1000 s")
+    across, up = axes.tolist()
+    return Reference(*figure_eight(spec, center, (across, up), seconds, RISE, time))
 
 
 def _each(spec: RobotSpec, name: str, given: Any) -> Array:

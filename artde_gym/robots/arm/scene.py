@@ -29,6 +29,7 @@ def scene(kwargs: Mapping[str, Any], env_id: str | None = None) -> Scene:
         kwargs.get("robot", "panda"),
         kwargs.get("tip"),
         kwargs.get("armature"),
+        kwargs.get("joints"),
         kwargs.get("reference", PICK),
         PERIOD,
         kwargs.get("duration", DURATION),

@@ -13,6 +13,8 @@ import numpy as np
 from artde_gym.arguments import check_number, steps_per_period
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
+from artde_gym.disturbances.friction import KIND as FRICTION
+from artde_gym.disturbances.friction import check_friction
 from artde_gym.disturbances.numeric import Words
 from artde_gym.errors import DisturbanceError, OptionError
 from artde_gym.layout import Field, Layout
@@ -24,15 +26,14 @@ from artde_gym.robots.arm.drawing import drawn
 from artde_gym.robots.arm.panda import panda
 from artde_gym.robots.arm.reader import read_arm
 from artde_gym.robots.arm.reference import reference
-from artde_gym.robots.arm.workspace import smallest_inertia
+from artde_gym.robots.arm.tool import Tool
+from artde_gym.robots.arm.workspace import TIME_STEP, smallest_inertia
 from artde_gym.sim.engine import World
 
-TIME_STEP = 0.001  # s, of the physics
 MAX_SPEED = 200.0  # rad/s or m/s, bound of observed joint speeds; of joints without a limit of their own the fastest
 TURN = 2 * math.pi  # rad, bound of observed angles of joints without limits
 FAR = 10.0  # m, bound of observed positions of the tool
 
-FRICTION = "joint_friction"
 REWARD_SCALES: dict[str, float] = {"alive": 1.0, "tracking": 2.0, "effort": -0.05, "smoothness": -0.05}
 """The reward of a control period L is L times the sum of these scales times their terms (see `DOCUMENTATION`)."""
 FALL_REASONS = ("position", "speed")
@@ -78,6 +79,7 @@ real arm stops. *Truncated* at the end of the reference. Limits are no contacts,
 | `robot` | "panda" | "panda", path | the arm |
 | `tip` | None | link of the file | end of the chain of joints; None: where it ends or branches |
 | `armature` | None | kg m^2, one number or one for each joint | reflected rotor inertia; None: the file's |
+| `joints` | None | names of joints on one way from the base | those that move; None: all to the tip |
 | `reference` | "pick-and-place" | see `artde_gym.robots.arm.reference` | reference of the joints |
 | `disturbances` | {default} | see `artde_gym.disturbances` | disturbances; `{{}}` for none but nominal friction |
 | `control_period` | 0.001 | whole multiples of 0.001 s up to 0.05 | control period L |
@@ -171,6 +173,7 @@ class Tracking:
         robot: str | os.PathLike[str],
         tip: str | None,
         armature: float | Sequence[float] | None,
+        joints: Sequence[str] | None,
         given: Any,
         control_period: float,
         duration: float,
@@ -183,14 +186,14 @@ class Tracking:
         """
         substeps = steps_per_period(control_period, TIME_STEP)
         seconds = check_number("duration", duration, 0.1, 1800.0, "0.1 to 1800 s")
-        spec = arm(robot, tip, armature)
+        spec = arm(robot, tip, armature, joints)
         period = substeps * TIME_STEP
         last = max(1, round(seconds / period))
         found = reference(spec, given, period * np.arange(last + 1))
         plan = np.concatenate(found, axis=1)
         friction = _friction(spec)
-        arguments = (robot, tip, armature, given, control_period, duration)
-        return cls(spec, substeps, plan, _tool(spec, found.q), *friction, arguments)
+        arguments = (robot, tip, armature, joints, given, control_period, duration)
+        return cls(spec, substeps, plan, Tool(spec).position(found.q), *friction, arguments)
 
     def __deepcopy__(self, _: dict[int, Any]) -> Tracking:
         return self  # immutable
@@ -225,6 +228,7 @@ class Tracking:
     def parse(self, disturbances: Mapping[str, Any]) -> Disturbances:
         """Parse disturbances of this arm."""
         parsed = Disturbances.parse(disturbances, self.words["site"], self.words["joint"], self.nominal_robot.name)
+        check_friction(parsed.entries, float(smallest_inertia(self.nominal_robot).min()), TIME_STEP)
         for kind, entry in parsed.entries:
             if kind == "sensor_noise" and (entry["tilt"] != 0 or entry["angular_velocity"] != 0):
                 raise DisturbanceError("sensor_noise", dict(entry), "position, velocity: the base of an arm is fixed")
@@ -278,19 +282,22 @@ def friction_scale(sampled: Mapping[str, Any]) -> float:
 
 
 def arm(
-    robot: str | os.PathLike[str] = "panda", tip: str | None = None, armature: float | Sequence[float] | None = None
+    robot: str | os.PathLike[str] = "panda",
+    tip: str | None = None,
+    armature: float | Sequence[float] | None = None,
+    joints: Sequence[str] | None = None,
 ) -> RobotSpec:
     """Return a built-in arm or one from a file.
 
     Raises:
-        OptionError: for anything but a name or a path, or a tip or armature of a built-in arm.
+        OptionError: for anything but a name or a path, or a tip, armature or joints of a built-in arm.
         RobotError: for a file that cannot be simulated.
     """
     if not isinstance(robot, (str, os.PathLike)):
         raise OptionError("robot", robot, "'panda', or the path of a URDF or MJCF file")
     if robot != "panda":
-        return drawn(read_arm(robot, tip=tip, armature=armature))
-    for name, value in (("tip", tip), ("armature", armature)):
+        return drawn(read_arm(robot, tip=tip, armature=armature, joints=joints))
+    for name, value in (("tip", tip), ("armature", armature), ("joints", joints)):
         if value is not None:
             raise OptionError(name, value, "None with a built-in arm")
     return panda()
@@ -311,13 +318,6 @@ def _friction(spec: RobotSpec) -> tuple[Array, Array, Array]:
             allowed = f"at most {most:.3g}, its smallest inertia over {TIME_STEP} s; servos' models carry such values"
             raise OptionError(f"damping of joint {name!r}", float(value), allowed)
     return damping, coulomb, np.maximum(slip, coulomb * TIME_STEP / inertia)
-
-
-def _tool(spec: RobotSpec, q: Array) -> Array:
-    tree = RigidBodyTree(spec)
-    _, link, point = next(site for site in spec.sites if site[0] == TOOL)
-    frames, body = tree.frames(q), [part.name for part in spec.links].index(link)
-    return frames.origin[:, body] + frames.rot[:, body] @ np.asarray(point)
 
 
 def reward_terms(error: Number, effort: Number, change: Number, exp: Callable[[Number], Number]) -> dict[str, Number]:

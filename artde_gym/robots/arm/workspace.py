@@ -1,4 +1,4 @@
-"""Inertia of an arm over its workspace."""
+"""Inertia and weight of an arm over its workspace."""
 
 from __future__ import annotations
 
@@ -12,16 +12,28 @@ from artde_gym.multibody.dynamics import RigidBodyTree
 from artde_gym.multibody.spec import RobotSpec
 
 POSES, SEED = 500, 0
+TIME_STEP = 0.001  # s, of the physics
+
+
+@functools.lru_cache(maxsize=8)
+def workspace(spec: RobotSpec) -> Array:
+    """Return random poses (poses, n) within the limits, the same for each call."""
+    limits = np.array([spec.by_name[name].limits for name in spec.actuated])
+    low = np.where(np.isfinite(limits[:, 0]), limits[:, 0], -math.pi)
+    high = np.where(np.isfinite(limits[:, 1]), limits[:, 1], math.pi)
+    return np.random.default_rng(SEED).uniform(low, high, (POSES, len(limits)))
 
 
 @functools.lru_cache(maxsize=8)
 def workspace_inertia(spec: RobotSpec) -> Array:
-    """Return M (poses, n, n) at random poses within the limits, the same for each call."""
-    limits = np.array([spec.by_name[name].limits for name in spec.actuated])
-    low = np.where(np.isfinite(limits[:, 0]), limits[:, 0], -math.pi)
-    high = np.where(np.isfinite(limits[:, 1]), limits[:, 1], math.pi)
-    q = np.random.default_rng(SEED).uniform(low, high, (POSES, len(limits)))
-    return RigidBodyTree(spec).joint_mass_matrix(q)
+    """Return M (poses, n, n) over the workspace."""
+    return RigidBodyTree(spec).joint_mass_matrix(workspace(spec))
+
+
+def largest_weight(spec: RobotSpec) -> Array:
+    """Return the largest torque (n,) (Nm or N) that holds each joint at rest over the workspace."""
+    q = workspace(spec)
+    return np.abs(RigidBodyTree(spec).joint_torques(q, 0 * q, 0 * q)).max(axis=0)
 
 
 def smallest_inertia(spec: RobotSpec) -> Array:

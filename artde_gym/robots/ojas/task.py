@@ -13,12 +13,14 @@ import numpy as np
 from artde_gym.arguments import check_bool, check_choice, steps_per_period
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
+from artde_gym.disturbances.friction import KIND as JOINT_FRICTION
+from artde_gym.disturbances.friction import check_friction
 from artde_gym.disturbances.ground import GrfPulses
 from artde_gym.disturbances.numeric import Words
 from artde_gym.errors import DisturbanceError
 from artde_gym.layout import Field, Layout
 from artde_gym.metrics_spec import EffortSignal, MetricsSpec, TrackedSignal
-from artde_gym.multibody.dynamics import GRAVITY
+from artde_gym.multibody.dynamics import GRAVITY, RigidBodyTree, joint_space_inertia
 from artde_gym.multibody.spec import RobotSpec, Vector
 from artde_gym.multibody.support import Supported
 from artde_gym.robots.ojas import model as robot
@@ -235,6 +237,9 @@ class Walk:
         if not any(self.nominal_robot.armature) and any(kind == "rotor_inertia" for kind, _ in parsed.entries):
             problem = "needs rotors, which discs and bare links have not"
             raise DisturbanceError("disturbances", "rotor_inertia", "choose actuator_inertia='rotor'", problem)
+        if any(kind == JOINT_FRICTION for kind, _ in parsed.entries):
+            inertia = joint_space_inertia(RigidBodyTree(self.nominal_robot).mass_matrix(self.start))
+            check_friction(parsed.entries, float(1.0 / np.diagonal(np.linalg.inv(inertia)).max()), TIME_STEP)
         return parsed
 
     def set_up(self, world: World, sampled: Mapping[str, Any]) -> None:
