@@ -13,22 +13,24 @@ from rich.console import Console
 from rich.table import Table
 
 from artde_gym.arguments import check_number
-from artde_gym.cli.arguments import json_object
+from artde_gym.cli.arguments import joined, json_object
 from artde_gym.errors import OptionError
-from artde_gym.files import write_atomically
-from artde_gym.kit import ROBOTS
+from artde_gym.files import check_figure, write_atomically
+from artde_gym.kit import ROBOTS, find_robot
 from artde_gym.palette import STYLES
 from artde_gym.report.chart import Axis, Chart
 from controllers.design import DELAYED, Design, designed
 from controllers.design import design as work_out
+from controllers.drive import DRIVES
+from controllers.motion import check_motion
 from controllers.support_design import SWITCHED, SupportDesign, derived_gains, design_supports
 
-NAMES = {ROBOTS[robot].title: robot for robot in designed() if robot in ROBOTS}
-"""Robots by title."""
+NAMES = [robot for robot in designed() if robot in ROBOTS]
+"""Robots whose m_bar can be judged."""
 
 
 def design(
-    robot: Annotated[str, typer.Option(help=f"{' or '.join(NAMES)}.")] = "biped",
+    robot: Annotated[str, typer.Option(help=f"{' or '.join(NAMES)}.")] = "ojas",
     law: Annotated[str, typer.Option(help=f"{', '.join((*DELAYED, *SWITCHED))}.")] = "tde",
     preset: Annotated[str | None, typer.Option(help="Preset of the law's gains; see `list controllers`.")] = None,
     gains: Annotated[str | None, typer.Option(help='JSON; override gains of the preset, e.g. {"m_bar": 0.08}.')] = None,
@@ -40,8 +42,9 @@ def design(
     step_duration: Annotated[float | None, typer.Option(help="Biped only: duration of a step (s). Default: 1.")] = None,
     motion: Annotated[str | None, typer.Option(help="JSON; arguments of another robot's motion.")] = None,
     cap: Annotated[
-        float, typer.Option(help="Laws that switch: largest eigenvalue of what is derived (kg m^2).")
-    ] = 0.09,
+        float | None,
+        typer.Option(help="Laws that switch: largest eigenvalue of what is derived (kg m^2). Default: 0.09."),
+    ] = None,
     figure: Annotated[
         Path | None, typer.Option(help="SVG file for the limit along the reference, one per loop.")
     ] = None,
@@ -52,22 +55,23 @@ def design(
     Of a law that switches with the support phase, print the range of each phase; --json holds, as "gains", the nominal
     inertias that follow from the robot's spec and gait.
     """
-    if robot not in NAMES:
-        raise OptionError("robot", robot, ", ".join(map(repr, NAMES)))
+    name = find_robot(robot, NAMES).name
+    switches = law in SWITCHED
+    _refuse_idle(switches, period, cap, figure)
     if period is not None:
         check_number("period", period, 1e-6, 10.0, "1e-6 to 10 s")
-    walk = {"actuator_inertia": actuator_inertia, "speed": speed, "step_duration": step_duration}
-    given = {name: value for name, value in walk.items() if value is not None} | json_object("--motion", motion)
-    if law in SWITCHED:
-        if figure is not None:
-            raise OptionError("figure", str(figure), f"a law with one m_bar: {', '.join(DELAYED)}")
-        chosen = json_object("gains", gains)
-        _show_supports(robot, law, design_supports(NAMES[robot], law, preset, cap, gains=chosen, **given), as_json)
-        return
-    found = work_out(NAMES[robot], law, preset, period, gains=json_object("gains", gains), **given)
     if figure is not None:
-        if not figure.name:
-            raise OptionError("figure", str(figure), "the path of a file, such as m_bar.svg")
+        check_figure("figure", figure)
+    walk = {"actuator_inertia": actuator_inertia, "speed": speed, "step_duration": step_duration}
+    given = joined("--motion", json_object("--motion", motion), {k: v for k, v in walk.items() if v is not None})
+    check_motion(name, (DRIVES[name].supports if switches else DRIVES[name].loops) or dict, given)
+    if switches:
+        chosen = json_object("gains", gains)
+        limit = {} if cap is None else {"cap": cap}
+        _show_supports(robot, law, design_supports(name, law, preset, **limit, gains=chosen, **given), as_json)
+        return
+    found = work_out(name, law, preset, period, gains=json_object("gains", gains), **given)
+    if figure is not None:
         for one in found:
             drawing = draw(one).encode()
             write_atomically(_file(figure, one, len(found) > 1), lambda file, drawing=drawing: file.write(drawing))
@@ -76,6 +80,16 @@ def design(
         return
     for one in found:
         _print(one, Console())
+
+
+def _refuse_idle(switches: bool, period: float | None, cap: float | None, figure: Path | None) -> None:
+    """Raise OptionError for an option that would do nothing with such a law."""
+    if switches and figure is not None:
+        raise OptionError("figure", str(figure), f"a law with one m_bar: {', '.join(DELAYED)}")
+    if switches and period is not None:
+        raise OptionError("period", period, f"a law with one m_bar: {', '.join(DELAYED)}")
+    if not switches and cap is not None:
+        raise OptionError("cap", cap, f"a law that switches: {', '.join(SWITCHED)}")
 
 
 def draw(one: Design) -> str:
