@@ -46,7 +46,7 @@ def test_worlds_may_choose_between_values_of_any_kind(kind: str, tmp_path: Path)
     assert found.complete
     chosen = [world.factors["x"] for world in found.design.worlds]
     assert all(value in chosen for value in values)
-    assert found.episodes["factor.x"].nunique() == 2
+    assert len(set(found.episodes["factor.x"].tolist())) == 2
     assert set(found.factors([0, 1, 2, 3]).ravel().tolist()) == ({0.1, 0.3} if kind == "numbers" else {0.0, 1.0})
     again = multiverse(made, tmp_path)  # nothing is left to do, and the folder can be read
     assert len(again.episodes) == len(found.episodes)
