@@ -117,7 +117,7 @@ def _joint(element: ET.Element, where: str) -> FileJoint | None:
     limit, friction = element.find("limit"), element.find("dynamics")
     damping, coulomb = (_not_negative(friction, key, where) for key in ("damping", "friction"))
     speed = _not_negative(limit, "velocity", where) or math.inf
-    effort = math.inf if limit is None or "effort" not in limit.keys() else _not_negative(limit, "effort", where)
+    effort = math.inf if limit is None or limit.get("effort") is None else _not_negative(limit, "effort", where)
     mimic = element.find("mimic")
     return FileJoint(
         check_name("joint", element.get("name"), where),
