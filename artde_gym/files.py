@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from artde_gym.errors import StoreError
+from artde_gym.errors import OptionError, StoreError
 
 
 def check_replaceable(path: Path) -> None:
@@ -20,6 +20,22 @@ def check_replaceable(path: Path) -> None:
     """
     if path.exists() and not path.is_file():
         raise StoreError("output file", str(path), "choose another name", "is not a file that could be replaced")
+
+
+def check_figure(field: str, path: Path) -> None:
+    """See that a figure can be written, before anything is computed for it.
+
+    Raises:
+        OptionError: for the name of no SVG file, or of one in a folder that does not exist.
+        StoreError: if it would take the place of a folder or a device.
+    """
+    if path.suffix.lower() != ".svg":
+        raise OptionError(field, str(path), "the path of an SVG file, such as figure.svg")
+    if not path.parent.is_dir():
+        raise OptionError(
+            field, str(path), "create the folder, or choose another", "is in a folder that does not exist"
+        )
+    check_replaceable(path)
 
 
 def write_atomically(path: Path, write: Callable[[BinaryIO], Any], by_way_of: Path | None = None) -> None:
@@ -34,7 +50,11 @@ def write_atomically(path: Path, write: Callable[[BinaryIO], Any], by_way_of: Pa
         StoreError: if it would take the place of a folder or a device.
     """
     check_replaceable(path)
-    handle, temporary = tempfile.mkstemp(dir=by_way_of or path.parent, prefix=f".{path.name}.")
+    try:
+        handle, temporary = tempfile.mkstemp(dir=by_way_of or path.parent, prefix=f".{path.name}.")
+    except OSError as error:
+        error.filename = str(path)  # not the temporary name, which tells nothing
+        raise
     try:
         with os.fdopen(handle, "wb") as file:
             write(file)

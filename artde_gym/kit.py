@@ -13,11 +13,12 @@ joint accelerations.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple
 
+from artde_gym.errors import UnknownNameError, suggest_names
 from artde_gym.registry import Registry
 from artde_gym.scenarios import Scenario
 
@@ -180,3 +181,20 @@ class RobotKit:
 
 ROBOTS: Registry[RobotKit] = Registry("robot", "artde_gym.robots", lambda kit: {kit.name: kit})
 """All robots by name."""
+
+
+def find_robot(name: object, among: Collection[str]) -> RobotKit:
+    """Return the robot of this name; a title will do, too, where it is the title of one robot alone.
+
+    Raises:
+        UnknownNameError: if none of the robots `among` which it is sought has it, or several have the title.
+    """
+    known = {robot: ROBOTS[robot] for robot in among if robot in ROBOTS}
+    if isinstance(name, str) and name in known:
+        return known[name]
+    titled = [robot for robot, kit in known.items() if kit.title == name]
+    if len(titled) > 1:
+        raise UnknownNameError("robot", name, f"choose {' or '.join(map(repr, titled))}", "is the title of several")
+    if titled:
+        return known[titled[0]]
+    raise UnknownNameError("robot", name, suggest_names(name, known))

@@ -7,6 +7,7 @@ import contextlib
 import datetime
 import json
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -67,9 +68,16 @@ def vectorized_by(vectorized: bool, backend: str | None) -> bool:
     return backend == "batch"
 
 
-def names(text: str) -> list[str]:
-    """Split a comma-separated list of names."""
-    return [name.strip() for name in text.split(",")]
+def names(option: str, text: str) -> list[str]:
+    """Split a comma-separated list of names.
+
+    Raises:
+        OptionError: if one of them is empty.
+    """
+    found = [name.strip() for name in text.split(",")]
+    if not all(found):
+        raise OptionError(option, text, "names with a comma between two of them")
+    return found
 
 
 def json_object(option: str, text: str | None) -> dict[str, Any]:
@@ -81,12 +89,37 @@ def json_object(option: str, text: str | None) -> dict[str, Any]:
     if text is None:
         return {}
     try:
-        value = json.loads(text)
+        value = json.loads(text, object_pairs_hook=lambda pairs: _each_once(option, pairs))
+    except OptionError:
+        raise
     except (ValueError, RecursionError) as error:
         raise OptionError(option, text, f"a JSON object ({error})") from error
     if not isinstance(value, dict):
         raise OptionError(option, text, "a JSON object")
     return value
+
+
+def _each_once(option: str, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return the pairs of a JSON object; a key given twice would lose a value."""
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        keys = [key for key, _ in pairs]
+        again = next(key for key in keys if keys.count(key) > 1)
+        raise OptionError(f"key of {option}", again, "leave one of them", "is given twice")
+    return found
+
+
+def joined(option: str, inside: Mapping[str, Any], beside: Mapping[str, Any]) -> dict[str, Any]:
+    """Return arguments in an option's JSON object and those of options of their own.
+
+    Raises:
+        OptionError: for an argument that is given in both ways with different values.
+    """
+    for name, value in beside.items():
+        if name in inside and inside[name] != value:
+            problem = f"contradicts the {value!r} of --{name.replace('_', '-')}"
+            raise OptionError(f"{name} in {option}", inside[name], "leave one of them out", problem)
+    return {**inside, **beside}
 
 
 def optional_json(option: str, text: str | None) -> dict[str, Any] | None:
@@ -110,12 +143,13 @@ def environment_kwargs(text: str | None, engine: str | None) -> dict[str, Any]:
     """Return the environment's arguments from `--env-kwargs` and `--engine`, before anything is opened or written.
 
     Raises:
-        OptionError: if the text is not a JSON object, or the engine is not installed (MissingDependencyError).
+        OptionError: if the text is not a JSON object, names another engine than `--engine`, or the engine is not
+            installed (MissingDependencyError).
     """
     kwargs = json_object("--env-kwargs", text)
     if engine is not None and engine in ENGINES:
         ENGINES[engine].require()
-    return kwargs if engine is None else {**kwargs, "engine": engine}
+    return joined("--env-kwargs", kwargs, {} if engine is None else {"engine": engine})
 
 
 def processes(workers: int | None) -> int:

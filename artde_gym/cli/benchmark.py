@@ -34,7 +34,7 @@ def benchmark(
     console = terminal()
     with console.status("") as status:
         found = measure(
-            None if sections is None else names(sections),
+            None if sections is None else names("--sections", sections),
             quick=quick,
             on_section=lambda name: status.update(Text(f"measuring: {name}")),
         )

@@ -28,7 +28,7 @@ def doctor(
     console = terminal()
     found: dict[str, Report] = {}
     start = time.monotonic()
-    for name, report in run_checks(None if checks is None else names(checks)):
+    for name, report in run_checks(None if checks is None else names("--checks", checks)):
         found[name] = report
         if not as_json:
             _print(report, console)

@@ -81,17 +81,17 @@ def evaluate(
         record_hz = trace_hz
     if scenario is None:
         env = WALK if env is None else env
-        scenario = ",".join(main_scenarios(env)) if disturbances is None else CUSTOM
-    if scenario in (CUSTOM, ""):
-        scenario = None
+        chosen = (main_scenarios(env) if disturbances is None else ()) or None
+    else:
+        chosen = None if scenario == CUSTOM else names("--scenario", scenario)
     kwargs = environment_kwargs(env_kwargs, engine)
     folder = folder_of(out)
     console = terminal()
     with Display(console) as display:
         result = run_evaluation(
-            names(controllers),
+            names("--controllers", controllers),
             env,
-            scenario=None if scenario is None else names(scenario),
+            scenario=chosen,
             episodes=episodes,
             seed=seed,
             workers=processes(workers),

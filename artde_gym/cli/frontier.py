@@ -30,7 +30,7 @@ from artde_gym.cli.arguments import (
 )
 from artde_gym.cli.display import Display, terminal
 from artde_gym.cli.report import show_report
-from artde_gym.files import write_atomically
+from artde_gym.files import check_figure, write_atomically
 from artde_gym.kit import ROBOTS
 
 if TYPE_CHECKING:
@@ -75,12 +75,14 @@ def frontier(
     from artde_gym.studies.frontier.console import print_frontier
 
     kwargs = environment_kwargs(env_kwargs, engine)
+    if figure is not None:
+        check_figure("--figure", figure)
     console, folder = terminal(), folder_of(out)
-    scenarios = [None] if scenario is None else names(scenario)
+    scenarios = [None] if scenario is None else names("--scenario", scenario)
     for one in scenarios:
         with Display(console) as display:
             found = run_frontier(
-                names(controllers),
+                names("--controllers", controllers),
                 env,
                 vary,
                 low=low,

@@ -34,7 +34,7 @@ def list_everything(
         raise UnknownNameError("topic", topic, f"{', '.join(TOPICS)}; --name needs one")
     found = {one: TOPICS[one]() for one in (TOPICS if topic is None else [topic])}
     if topic is not None and name is not None:
-        found[topic] = _chosen(found[topic], topic, names(name))
+        found[topic] = _chosen(found[topic], topic, names("--name", name))
     if as_json:
         print(json.dumps(found if topic is None else found[topic], indent=2))
         return

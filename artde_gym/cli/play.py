@@ -57,7 +57,7 @@ def play(
     if port is not None and not 0 <= port <= 65535:
         raise OptionError("--port", port, "0 to 65535")
     plan = Plan.of(
-        names(controllers),
+        names("--controllers", controllers),
         env,
         scenario=scenario,
         seed=seed,

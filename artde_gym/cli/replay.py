@@ -58,7 +58,7 @@ def replay(
 
         if folder is None:
             made = run_replay(
-                names(controllers or "artde"),
+                names("--controllers", "artde" if controllers is None else controllers),
                 env,
                 scenario=scenario,
                 seed=seed,
@@ -75,8 +75,8 @@ def replay(
                     raise OptionError(
                         option, value, "leave it out", "does not go with a folder, whose episodes stay as they were run"
                     )
-            wanted = None if scenario is None else names(scenario)
-            chosen = None if controllers is None else names(controllers)
+            wanted = None if scenario is None else names("--scenario", scenario)
+            chosen = None if controllers is None else names("--controllers", controllers)
             made = replay_folder(folder, wanted, chosen, episode, on_progress=told)
     file = made.save(out, viewer=viewer)
     for note in made.notes:

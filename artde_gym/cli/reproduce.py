@@ -14,11 +14,11 @@ from artde_gym.errors import OptionError
 from artde_gym.kit import ROBOTS
 from artde_gym.sim.factory import ENGINES, resolve_engine
 
-ROBOT_TITLES = [kit.title for kit in ROBOTS.values() if kit.reproduced[0]]
+ROBOT_NAMES = [name for name, kit in ROBOTS.items() if kit.reproduced[0]]
 
 
 def reproduce(
-    robot: Annotated[str, typer.Option(help=f"{', '.join(ROBOT_TITLES)}, or all.")] = "all",
+    robot: Annotated[str, typer.Option(help=f"{', '.join(ROBOT_NAMES)}, or all.")] = "all",
     engine: Annotated[
         str | None, typer.Option(help=f"Physics engine: {', '.join(ENGINES)}, or both. Default: the fastest.")
     ] = None,
@@ -49,11 +49,11 @@ def reproduce(
     from artde_gym.studies import reproduce as run_reproduction
     from artde_gym.studies.frontier.console import print_frontier
     from artde_gym.studies.reproduce.claims import confirm
-    from artde_gym.studies.reproduce.reproduction import scenarios_of, titles
+    from artde_gym.studies.reproduce.reproduction import folder_name, kit_of, reproducible, scenarios_of
 
-    robots = titles() if robot == "all" else [robot]
+    robots = reproducible() if robot == "all" else [kit_of(robot).name]
     engines = list(ENGINES) if engine == "both" else [None if engine is None else resolve_engine(engine)]
-    named = None if scenario is None else names(scenario)
+    named = None if scenario is None else names("--scenario", scenario)
     shares = {name: chosen for name in robots if (chosen := scenarios_of(name, named))}
     for one in named or ():
         if not any(one in chosen for chosen in shares.values()):
@@ -65,9 +65,9 @@ def reproduce(
             with Display(console) as display:
                 found = run_reproduction(
                     name,
-                    out / (one or "fastest") / name,
+                    out / (one or "fastest") / folder_name(name),
                     scenarios=chosen,
-                    controllers=None if controllers is None else names(controllers),
+                    controllers=None if controllers is None else names("--controllers", controllers),
                     ablation=ablation,
                     curves=curves,
                     episodes=episodes,
@@ -90,5 +90,5 @@ def reproduce(
                 raise typer.Exit(130)
         if len(engines) > 1:
             both = confirm(verdicts)
-            both.to_csv(out / f"claims-{name}.csv", index=False)
+            both.to_csv(out / f"claims-{folder_name(name)}.csv", index=False)
             print_claims(both, console)

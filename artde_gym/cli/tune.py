@@ -56,7 +56,7 @@ def tune(
     console = terminal()
     with Display(console) as display:
         found = run_tuning(
-            names(controllers),
+            names("--controllers", controllers),
             env,
             scenario=scenario,
             trials=trials,

@@ -51,7 +51,7 @@ def video(
     with Progress(*columns_shown, console=console, transient=True) as bar:
         shown = bar.add_task("")
         file = make_video(
-            names(controllers),
+            names("--controllers", controllers),
             out,
             env,
             scenario=scenario,

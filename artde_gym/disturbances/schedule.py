@@ -44,7 +44,8 @@ class Push(NamedTuple):
 
 def force_of(entry: Mapping[str, Any]) -> Vector:
     """Return the force (N, world axes) of a sampled push."""
-    direction = np.asarray(entry["direction"], np.float64)
+    given = np.asarray(entry["direction"], np.float64)
+    direction = np.ldexp(given, -np.frexp(np.abs(given).max())[1])  # exact, so that no square underflows
     x, y, z = (entry["magnitude"] * direction / np.linalg.norm(direction)).tolist()
     return x, y, z
 

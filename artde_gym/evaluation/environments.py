@@ -13,7 +13,7 @@ from gymnasium.envs.registration import load_env_creator
 from gymnasium.vector import AutoresetMode
 
 from artde_gym.deprecation import warn
-from artde_gym.errors import OptionError, suggest_names
+from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from artde_gym.kit import ROBOTS
 from artde_gym.metrics_spec import MetricsSpec
 from artde_gym.sim.factory import ENGINES, resolve_engine
@@ -30,7 +30,7 @@ def arguments_of(env_id: str, vectorized: bool = False) -> Mapping[str, inspect.
     """Return an environment's arguments by name, without the number of environments of a vector.
 
     Raises:
-        gymnasium.error.Error: if there is no such environment.
+        UnknownNameError: if there is no such environment.
         OptionError: if `vectorized` is set and it has no vector environment.
     """
     known = dict(inspect.signature(load_env_creator(_entry_point(env_id, vectorized))).parameters)
@@ -180,7 +180,10 @@ def _checked(env_id: str, arguments: str, vectorized: bool) -> dict[str, Any]:
 
 
 def _entry_point(env_id: str, vectorized: bool) -> str:
-    spec = gym.spec(env_id)
+    try:
+        spec = gym.spec(env_id)
+    except (gym.error.Error, ImportError):
+        raise UnknownNameError("environment", env_id, suggest_names(env_id, ours())) from None
     if not vectorized:
         return str(spec.entry_point)
     if spec.vector_entry_point is None:

@@ -100,15 +100,32 @@ class Result:
         numbers = self.episodes.select_dtypes("number").columns
         return [name for name in numbers if name not in _NOT_METRICS and not name.startswith(DRAWN)]
 
+    def has(self, scenario: str, controller: str) -> bool:
+        """Return True if a controller has an episode in a scenario; any names may be asked for."""
+        if self.episodes.empty:
+            return False
+        return bool(((self.episodes["scenario"] == scenario) & (self.episodes["controller"] == controller)).any())
+
     def rows(self, scenario: str, controller: str) -> pd.DataFrame:
-        """Return the episodes of one controller in one scenario, indexed by their number."""
+        """Return the episodes of one controller in one scenario, indexed by their number.
+
+        Raises:
+            UnknownNameError: for a scenario or controller of no episode; so do all methods that take names.
+        """
+        _check_known("scenario", scenario, self.scenarios)
+        _check_known("controller", controller, self.controllers)
         chosen = (self.episodes["scenario"] == scenario) & (self.episodes["controller"] == controller)
         frame: pd.DataFrame = self.episodes.loc[chosen]
         return frame.copy().set_index("episode")  # a copy is one block: many columns would be slow otherwise
 
     def values(self, scenario: str, controller: str, metric: str) -> Array:
         """Return a metric over the episodes of one controller in one scenario."""
-        return self.rows(scenario, controller)[metric].to_numpy(dtype=np.float64)
+        rows = self.rows(scenario, controller)
+        self._check_metric(metric)
+        return rows[metric].to_numpy(dtype=np.float64)
+
+    def _check_metric(self, metric: str) -> None:
+        _check_known("metric", metric, [str(name) for name in self.episodes.select_dtypes(["number", "bool"])])
 
     def falls(self, scenario: str, controller: str) -> tuple[int, statistics.Estimate]:
         """Return the number of falls, and their rate with Wilson's interval."""
@@ -117,6 +134,8 @@ class Result:
 
     def recovery(self, scenario: str, controller: str, event: str) -> Recovery:
         """Return the recovery of one controller after an event, e.g. "push0", in one scenario."""
+        events = [name.removeprefix(RECOVERY) for name in self.metrics if name.startswith(RECOVERY)]
+        _check_known("event", event, events)
         times = self.values(scenario, controller, RECOVERY + event)
         known = times[~np.isnan(times)]
         return Recovery(statistics.rate(int(np.isfinite(known).sum()), len(known)), statistics.median(known))
@@ -141,7 +160,9 @@ class Result:
 
     def pairs(self, scenario: str, first: str, second: str, metric: str) -> tuple[Array, Array]:
         """Return a metric's values of two controllers on the same seeds; see `compare` for the selection of seeds."""
-        return _comparable(*paired(self.rows(scenario, first), self.rows(scenario, second)), metric)
+        rows = self.rows(scenario, first), self.rows(scenario, second)
+        self._check_metric(metric)
+        return _comparable(*paired(*rows), metric)
 
     def compare(self, first: str, second: str) -> pd.DataFrame:
         """Compute paired differences first - second, indexed by scenario and metric.
@@ -157,8 +178,7 @@ class Result:
             UnknownNameError: for a controller that was not evaluated.
         """
         for name in (first, second):
-            if name not in self.controllers:
-                raise UnknownNameError("controller", name, suggest_names(name, self.controllers))
+            _check_known("controller", name, self.controllers)
         lines = []
         for scenario in self.scenarios:
             mine, theirs = paired(*(self.rows(scenario, name) for name in (first, second)))
@@ -176,6 +196,11 @@ class Result:
         columns = ["scenario", "metric", first, second, "difference", "low", "high"]
         columns += ["percent", "win_probability", "pairs"]
         return WideTable(lines, columns=columns).set_index(["scenario", "metric"])
+
+
+def _check_known(field: str, name: str, known: Sequence[str]) -> None:
+    if name not in known:
+        raise UnknownNameError(field, name, suggest_names(name, known) if known else "none: no episode has any")
 
 
 def _is_time(metric: str) -> bool:

@@ -139,7 +139,7 @@ def read_episodes(folder: Path) -> tuple[str, pd.DataFrame]:
     with wrap_read_errors(TABLE, path, _UNDAMAGED, StoreError):
         text = path.read_text(encoding="utf-8") if path.exists() else ""
         whole = text[: text.rfind("\n") + 1]
-        if not whole:
+        if whole.count("\n") < 2:  # no row was finished, or not even the names of the columns
             return "", pd.DataFrame({name: [] for name in KEY})
         frame = parse_table(whole, _WORDS).rename(columns=current_column)
         for name in KEY[:2]:

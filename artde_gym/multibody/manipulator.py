@@ -221,7 +221,7 @@ def _driven(body: Link, joint: FileJoint, file: str) -> Link:
     if joint.limits[0] >= joint.limits[1]:
         raise RobotError(f"limit of joint {joint.name!r} in {file}", joint.limits, "lower < upper")
     if not 0 < joint.effort < math.inf:
-        allowed = "an effort above zero, the largest torque of its motor"
+        allowed = "a finite number above zero, the largest torque of its motor in both directions"
         raise RobotError(f"effort of joint {joint.name!r} in {file}", joint.effort, allowed)
     shared = ("limits", "prismatic", "effort", "speed", "damping", "coulomb")
     return dataclasses.replace(body, axis=_vector(joint.axis), **{field: getattr(joint, field) for field in shared})

@@ -133,13 +133,14 @@ def _joint(element: ET.Element, where: str) -> FileJoint | None:
     if kind == "fixed":
         return None
     axis = _vector(element.find("axis"), "xyz", (1.0, 0.0, 0.0), f"axis of {where}")
-    length = float(np.linalg.norm(axis))
-    if not length > 1e-6:
-        raise RobotError(f"axis of {where}", axis.tolist(), "a direction, not zero")
+    with np.errstate(over="ignore"):
+        length = float(np.linalg.norm(axis))
+    if not 1e-6 < length < math.inf:
+        raise RobotError(f"axis of {where}", axis.tolist(), "a direction, not zero, of a finite length")
     limit, friction = element.find("limit"), element.find("dynamics")
     damping, coulomb = (_not_negative(friction, key, where) for key in ("damping", "friction"))
     speed = _not_negative(limit, "velocity", where) or math.inf
-    effort = _not_negative(limit, "effort", where) or math.inf
+    effort = math.inf if limit is None or limit.get("effort") is None else _not_negative(limit, "effort", where)
     mimic = element.find("mimic")
     return FileJoint(
         check_name("joint", element.get("name"), where),

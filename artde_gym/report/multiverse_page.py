@@ -125,7 +125,8 @@ def _curves(found: Multiverse) -> str:
     shown = styles(found.controllers)
     numbers = along.numbers(_values(found, along))
     edges = np.unique(np.quantile(numbers, np.linspace(0.0, 1.0, BINS + 1)))
-    x = Axis.of(along.label, numbers, log=along.kind == "log_uniform")
+    key = ", ".join(f"{place}: {text}" for place, text in enumerate(along.categories))
+    x = Axis.of(f"{along.label}, {key}" if key else along.label, numbers, log=along.kind == "log_uniform")
     charts = {}
     for head, chosen in _groups(found, by).items():
         chart = Chart(
@@ -251,7 +252,7 @@ def _lines(node: Node, factors: Sequence[Factor], text: str, depth: int) -> Iter
 
 def _condition(factor: Factor, sign: str, threshold: float) -> str:
     places = factor.numbers(factor.arguments) if factor.kind == "choice" else np.zeros(0)
-    if len(places) and not isinstance(factor.arguments[0], (int, float)):
+    if factor.categories:
         kept = (places <= threshold) == (sign == "≤")
         words = [str(value) for value, keep in zip(factor.arguments, kept.tolist(), strict=True) if keep]
         return f"{factor.name} {' or '.join(words)}"
@@ -314,7 +315,8 @@ def _ends(found: Multiverse, verdict: Verdict) -> str:
     if verdict.most_favorable is None or verdict.least_favorable is None:
         return ""
     shown = []
-    for what, world in (("Most", verdict.most_favorable), ("Least", verdict.least_favorable)):
+    ends = {verdict.least_favorable: "Least", verdict.most_favorable: "Most"}  # one, where one world alone decides
+    for world, what in reversed(ends.items()):
         lines = "\n".join(found.command(world, verdict.claim.controllers))
         shown.append(paragraph(f"{what} favorable: world {world}"))
         shown.append(

@@ -152,7 +152,7 @@ def _multiverse(folder: Path) -> str:
     title = f"Claims over plausible worlds of {found.design.env_id}"
     body = [f"<h1>{escape(title)}</h1>"]
     if found.episodes.empty:
-        return page(title, [*body, paragraph("No episode was finished yet."), _origin(origin)])
+        raise StoreError("multiverse", str(folder), "run the command that made it again", "has no finished episode")
     head, lines = multiverse_page.answer(found)
     body.append(_answer(head, {"": lines}))
     if not found.complete:

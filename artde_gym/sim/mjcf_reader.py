@@ -19,6 +19,7 @@ mj: Any = mujoco  # compiled, without type information
 
 REFUSED = ("attach", "composite", "extension", "flex", "flexcomp", "include", "model", "plugin", "replicate", "skin")
 """Elements that read other files, load code or multiply bodies."""
+_OF_JOINT = [int(kind) for kind in (mj.mjtTrn.mjTRN_JOINT, mj.mjtTrn.mjTRN_JOINTINPARENT)]
 
 
 def read_mjcf(root: ET.Element, text: str, file: str) -> ModelTree:
@@ -131,8 +132,8 @@ class _Reader:
             (low, high),
             self._effort(j),
             damping=self._linear("damping", own, model.dof_damping[dof]),
-            coulomb=float(model.dof_frictionloss[dof]),
-            armature=float(model.dof_armature[dof]),
+            coulomb=self._not_negative("frictionloss", own, model.dof_frictionloss[dof]),
+            armature=self._not_negative("armature", own, model.dof_armature[dof]),
             follows=self._follows.get(j, ""),
         )
         return joint, model.jnt_pos[j].copy()
@@ -142,18 +143,35 @@ class _Reader:
         first, *others = np.ravel(values).tolist()
         if any(others):
             raise self._error(f"{what} of joint {joint!r}", np.ravel(values).tolist(), "one number")
-        return first
+        return self._not_negative(what, joint, first)
+
+    def _not_negative(self, what: str, joint: str, value: Any) -> float:
+        if not value >= 0:
+            raise self._error(f"{what} of joint {joint!r}", float(value), "a number >= 0")
+        return float(value)
 
     def _effort(self, joint: int) -> float:
-        """Return the smallest limit of a joint's force that the joint or an actuator sets."""
+        """Return the largest force that a joint can have in both directions, as the joint or an actuator limits it."""
         model = self._model
-        effort = float(model.jnt_actfrcrange[joint, 1]) if model.jnt_actfrclimited[joint] else math.inf
-        for actuator in range(model.nu):
-            of_joint = model.actuator_trntype[actuator] == mj.mjtTrn.mjTRN_JOINT
-            if of_joint and model.actuator_trnid[actuator, 0] == joint and model.actuator_forcelimited[actuator]:
-                gear = abs(float(model.actuator_gear[actuator, 0]))
-                effort = min(effort, gear * float(model.actuator_forcerange[actuator, 1]))
-        return effort
+        bounds = [model.jnt_actfrcrange[joint]] if model.jnt_actfrclimited[joint] else []
+        for i in range(model.nu):
+            if model.actuator_trntype[i] in _OF_JOINT and model.actuator_trnid[i, 0] == joint:
+                gear = float(model.actuator_gear[i, 0])
+                if model.actuator_forcelimited[i]:
+                    bounds.append(gear * model.actuator_forcerange[i])
+                if model.actuator_ctrllimited[i] and self._is_motor(i):
+                    bounds.append(gear * model.actuator_gainprm[i, 0] * model.actuator_ctrlrange[i])
+        return min((min(-float(min(one)), float(max(one))) for one in bounds), default=math.inf)
+
+    def _is_motor(self, actuator: int) -> bool:
+        """Return True if an actuator's force is its control times a constant."""
+        model = self._model
+        kinds = (model.actuator_dyntype, model.actuator_gaintype, model.actuator_biastype)
+        return [int(kind[actuator]) for kind in kinds] == [
+            mj.mjtDyn.mjDYN_NONE,
+            mj.mjtGain.mjGAIN_FIXED,
+            mj.mjtBias.mjBIAS_NONE,
+        ]
 
     def _check_constraints(self) -> None:
         model = self._model

@@ -26,6 +26,7 @@ from controllers.laws.tracking import (
     JointInput,
     check_non_negative,
     check_positive_number,
+    check_switch,
     desired_acceleration,
     errors,
     inner,
@@ -71,6 +72,7 @@ class ArtdeGains(TdeGains):
             check_non_negative(field, getattr(self, field))
         if not (is_finite(self.beta_start) and self.beta_start >= self.beta_floor):
             raise GainError("beta_start", self.beta_start, f"a finite number >= beta_floor = {self.beta_floor:g}")
+        check_switch("clamp", self.clamp)
         if self.growth not in ("printed", "midpoint"):
             raise GainError("growth", self.growth, "'printed', 'midpoint'")
         if not ((is_finite(self.cap) or self.cap == math.inf) and self.cap >= self.beta_start):

@@ -29,6 +29,7 @@ from controllers.laws.tracking import (
     check_positive_number,
     desired_acceleration,
     errors,
+    is_finite,
     make_plain,
     sliding_variable,
     sliding_weights,
@@ -72,7 +73,8 @@ def check_inertia(field: str, m_bar: Inertia) -> None:
         raise GainError(field, m_bar, allowed) from None
     if matrix.ndim == 2:
         symmetric = matrix.shape[0] == matrix.shape[1] and np.allclose(matrix, matrix.T)
-        if not (symmetric and np.all(np.isfinite(matrix)) and np.all(np.linalg.eigvalsh(matrix) > 0)):
+        numbers = all(map(is_finite, np.asarray(m_bar, dtype=object).ravel().tolist()))  # no text, no truth values
+        if not (symmetric and numbers and np.all(np.linalg.eigvalsh(matrix) > 0)):
             raise GainError(field, m_bar, allowed)
     else:
         check_positive(field, m_bar)  # pyright: ignore[reportArgumentType]  # not a matrix here

@@ -121,6 +121,12 @@ def check_non_negative(field: str, value: float) -> None:
         raise GainError(field, value, "a finite number >= 0")
 
 
+def check_switch(field: str, value: object) -> None:
+    """Raise GainError unless `value` is a truth value."""
+    if not isinstance(value, bool):
+        raise GainError(field, value, "true, false")
+
+
 def is_finite(value: object) -> TypeGuard[float]:
     """Return True if `value` is a finite number, and no truth value."""
     return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)

@@ -95,7 +95,7 @@ def quadrotor(tmp_path_factory) -> Any:
         ({"nonsense": 1}, "key of the design is 'nonsense'"),
         ({"factors": {}}, "factors is {}"),
         ({"factors": {"x": {"path": "env_kwargs.speed", "uniform": [0.1, 0.2]}}}, "source of factor 'x' is None"),
-        ({"factors": {"x": {**ONE["x"], "uniform": [0.2, 0.1]}}}, "factor 'x': uniform.uniform is"),
+        ({"factors": {"x": {**ONE["x"], "uniform": [0.2, 0.1]}}}, "factor 'x'.uniform is"),
         ({"factors": {"x": {**ONE["x"], "choice": [1]}}}, "exactly one of"),
         ({"factors": {"x": {**ONE["x"], "pth": 1}}}, "did you mean 'path'"),
         ({"factors": {"x": {**ONE["x"], "path": "speed"}}}, "path is 'speed'"),
@@ -111,7 +111,7 @@ def quadrotor(tmp_path_factory) -> Any:
         ({"vectorized": "batches"}, "vectorized is 'batches'"),
         ({"env": None}, "neither env nor scenario"),
         ({"figure": ["y"]}, "one or two of the factors: x"),
-        ({"set": {"disturbances.payload.mass": 1.0}}, "with a scenario, or with disturbances"),
+        ({"set": {"disturbances.payload.mass": 1.0}}, "needs a scenario"),
         (
             {"disturbances": {}, "set": {"disturbances.payload.position.3": 1.0}},
             "component in disturbances.payload.position.3 is '3'",
@@ -152,10 +152,10 @@ def test_standard_designs_are_whole(robot):
 
 def test_a_sample_fills_each_factor_evenly_and_the_first_worlds_stay():
     factors = [
-        Factor.of("flat", {"path": "seed", "uniform": [2.0, 4.0], "source": "a"}),
+        Factor.of("flat", {"path": "gains", "uniform": [2.0, 4.0], "source": "a"}),
         Factor.of("log", {"path": "env", "log_uniform": [0.01, 100.0], "source": "a"}),
         Factor.of("halves", {"path": "scenario", "quantiles": [0.0, 0.45, 0.6], "source": "a"}),
-        Factor.of("kind", {"path": "controller", "choice": ["a", "b", "c", "d"], "source": "a"}),
+        Factor.of("kind", {"path": "disturbances", "choice": ["a", "b", "c", "d"], "source": "a"}),
     ]
     worlds = sample(factors, 256, seed=5)
     columns = {factor.name: [world[factor.name] for world in worlds] for factor in factors}

@@ -49,7 +49,7 @@ def test_a_disturbance_changes_one_value_of_those_that_are_there():
     assert SCENARIOS["S2"].disturbances["payload"]["mass"] == 1.3
     whole = design({**SMALL, "grid": {"disturbances": [{}, {"wind": 1.0}], "disturbances.wind.scale": [3]}}).points
     assert [point.cell.kwargs["disturbances"] for point in whole] == [{"wind": {"scale": 3}}]  # both come out the same
-    with pytest.raises(OptionError, match="with a scenario"):
+    with pytest.raises(OptionError, match="needs a scenario"):
         design({"controller": "tde", "grid": {"disturbances.payload.mass": [1]}})
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from artde_gym.arguments import check_number
 from artde_gym.arrays import Array
 from artde_gym.errors import OptionError
-from artde_gym.multibody.spec import RobotSpec
+from artde_gym.multibody.spec import Link, RobotSpec
 from artde_gym.robots.arm.figure_eight import figure_eight
 from artde_gym.robots.arm.panda import HOME, panda
 
@@ -58,7 +58,8 @@ def reference(spec: RobotSpec, given: Any, time: Array) -> Reference:
     """Return the reference of an arm at times (samples,) (s).
 
     Raises:
-        OptionError: for anything but the kinds at the top, or a reference beyond the joints' limits.
+        OptionError: for anything but the kinds at the top, a reference beyond the joints' limits of position or speed,
+            or sines that the samples cannot show.
     """
     if isinstance(given, Mapping) and given.keys() == {"times", "points"}:
         found = _way_points(spec, given["times"], given["points"], time)
@@ -74,12 +75,20 @@ def reference(spec: RobotSpec, given: Any, time: Array) -> Reference:
         found = _sines(spec, 0.5 * np.minimum(_offsets(spec, 1.0), 0.6), _slow(spec), time)
     else:
         raise OptionError("reference", given, _ALLOWED)
-    for name, q, (low, high) in zip(spec.actuated, found.q.T, _limits(spec), strict=True):
-        if not (low < q.min() and q.max() < high):
-            raise OptionError(
-                f"reference of {name}", (float(q.min()), float(q.max())), f"above {low:g}, below {high:g}"
-            )
+    for name, q, qd in zip(spec.actuated, found.q.T, found.qd.T, strict=True):
+        _check_joint(spec.by_name[name], q, float(np.abs(qd).max()))
     return found
+
+
+def _check_joint(link: Link, q: Array, fastest: float) -> None:
+    """Refuse a reference that leaves a joint's limits of position or speed (from its spec, infinite without any)."""
+    low, high = link.limits
+    if not (low < q.min() and q.max() < high):
+        field = f"reference of {link.name}"
+        raise OptionError(field, (float(q.min()), float(q.max())), f"above {low:g}, below {high:g}")
+    if not fastest <= link.speed:
+        unit = "m/s" if link.prismatic else "rad/s"
+        raise OptionError(f"speed of the reference of {link.name}", fastest, f"at most {link.speed:g} {unit}")
 
 
 def _limits(spec: RobotSpec) -> list[tuple[float, float]]:
@@ -129,6 +138,9 @@ def _way_points(spec: RobotSpec, times: Any, points: Any, time: Array) -> Refere
 def _sines(spec: RobotSpec, amplitude: Any, frequency: Any, time: Array) -> Reference:
     """Return home + A r(t) (sin(w t) + sin(1.7 w t) / 2) / 1.5, where r rises from rest with minimum jerk."""
     size, rate = (_each(spec, name, value) for name, value in (("amplitude", amplitude), ("frequency", frequency)))
+    most = 0.5 / float(time[1] - time[0]) / SECOND if len(time) > 1 else np.inf
+    if not (rate < most).all():
+        raise OptionError("frequency of the reference", frequency, f"below {most:g} Hz, which the samples can show")
     x = np.clip(time / RISE, 0.0, 1.0)[:, None]
     rise = x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
     rise_1 = 30.0 * x**2 * (1.0 - x) ** 2 / RISE

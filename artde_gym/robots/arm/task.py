@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -18,7 +19,7 @@ from artde_gym.disturbances.friction import check_friction
 from artde_gym.disturbances.numeric import Words
 from artde_gym.errors import DisturbanceError, OptionError
 from artde_gym.layout import Field, Layout
-from artde_gym.metrics_spec import EffortSignal, MetricsSpec, TrackedSignal
+from artde_gym.metrics_spec import EffortSignal, Fields, MetricsSpec, TrackedSignal
 from artde_gym.multibody.dynamics import GRAVITY, RigidBodyTree
 from artde_gym.multibody.manipulator import TOOL
 from artde_gym.multibody.spec import RobotSpec, Vector
@@ -125,20 +126,32 @@ def _units(spec: RobotSpec) -> tuple[str, str, str, str]:
     return "rad or m", "rad/s or m/s", "rad/s^2 or m/s^2", "Nm or N"
 
 
+def _tool_error(fields: Fields) -> Array:
+    return fields["tool_ref"] - fields["tool"]
+
+
+def _angle_error(columns: Sequence[int], fields: Fields) -> Array:
+    return (fields["q_ref"] - fields["q"])[..., columns]
+
+
+def _power(fields: Fields) -> Array:
+    return np.abs(fields["tau_applied"] * fields["qd"]).sum(axis=-1)
+
+
 def metrics_spec(spec: RobotSpec) -> MetricsSpec:
     """Return the tracked signals of an arm: the tool's position, its turning joints, and all torques."""
     turning = {f"q{i + 1}": i for i, name in enumerate(spec.actuated) if not spec.by_name[name].prismatic}
     columns = list(turning.values())
     joints = {name: number for number, name in enumerate(turning)}
-    tool = TrackedSignal("mm", 1e3, {"x": 0, "y": 1, "z": 2}, lambda fields: fields["tool_ref"] - fields["tool"])
-    angles = TrackedSignal("deg", 180.0 / math.pi, joints, lambda fields: (fields["q_ref"] - fields["q"])[..., columns])
+    tool = TrackedSignal("mm", 1e3, {"x": 0, "y": 1, "z": 2}, _tool_error)
+    angles = TrackedSignal("deg", 180.0 / math.pi, joints, functools.partial(_angle_error, columns))
     n = len(spec.actuated)
     return MetricsSpec(
         errors=(tool, angles) if turning else (tool,),
         norm=True,
         settling_band=0.001,
         efforts=(EffortSignal("torque", "nm", "tau_applied", slice(n), {f"q{i + 1}": i for i in range(n)}),),
-        power=lambda fields: np.abs(fields["tau_applied"] * fields["qd"]).sum(axis=-1),
+        power=_power,
         saturated_field="tau_applied",
         saturation_margin=0.0,
         tde_errors={"tde_error_rms": "sigma"},

@@ -213,7 +213,7 @@ class _Levels:
 
     def _count(self, result: Result, scenario: str, value: float, name: str) -> bool:
         """Count a controller's falls at a level, and say whether it survived."""
-        if result.episodes.empty or result.rows(scenario, name).empty:
+        if not result.has(scenario, name):
             return False
         falls, rate = result.falls(scenario, name)
         share = statistics.rate(rate.n - falls, rate.n)

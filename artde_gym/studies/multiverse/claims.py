@@ -81,12 +81,14 @@ class WorldClaim:
         controllers: of which it is made.
         judge: worlds -> outcomes and margins.
         compares_errors: whether the margin is the logarithm of the second controller's error over the first one's.
+        metric: that it compares; None for none, or for one that every table has.
     """
 
     text: str
     controllers: tuple[str, ...]
     judge: Judge
     compares_errors: bool = False
+    metric: str | None = None
 
 
 def survives(more: str, less: str) -> WorldClaim:
@@ -112,7 +114,7 @@ def smaller(first: str, second: str, metric: str | None = None) -> WorldClaim:
 
     what = "RMS error" if metric is None else metric
     text = f"{what} of {first} below that of {second}, both surviving"
-    return WorldClaim(text, (first, second), judge, compares_errors=True)
+    return WorldClaim(text, (first, second), judge, compares_errors=True, metric=metric)
 
 
 def ordered(*names: str) -> WorldClaim:

@@ -31,6 +31,9 @@ def print_multiverse(found: Multiverse, console: Console) -> None:
         return
     console.print(_survival(found))
     console.print(_claims(found))
+    for verdict in found.verdicts:
+        if not verdict.decided:
+            console.print(Text(f"No world says anything of {verdict.claim.text!r}."))
     _print_deciding(found, console)
     _print_ends(found, console)
     if not found.complete:
@@ -103,7 +106,8 @@ def _print_ends(found: Multiverse, console: Console) -> None:
     first = next((verdict for verdict in found.verdicts if verdict.most_favorable is not None), None)
     if first is None:
         return
-    for what, world in (("most", first.most_favorable), ("least", first.least_favorable)):
+    ends = {first.least_favorable: "least", first.most_favorable: "most"}  # one, where one world alone decides
+    for world, what in reversed(ends.items()):
         if world is not None:
             console.print(f"World {world}, the {what} favorable to {first.claim.text!r}:")
             for line in found.command(world, first.claim.controllers):

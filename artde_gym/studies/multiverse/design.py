@@ -39,12 +39,11 @@ from artde_gym.kit import ROBOTS
 from artde_gym.registration import registered_controllers
 from artde_gym.scenarios import scenario as find_scenario
 from artde_gym.studies.multiverse.claims import WorldClaim, read_claims
-from artde_gym.studies.multiverse.factor import Factor, sample
+from artde_gym.studies.multiverse.factor import Factor, check_world_path, sample
 from artde_gym.studies.reproduce.reproduction import ABLATION
 from artde_gym.studies.sweep.design import (
     SETTINGS,
     SweepCell,
-    check_path,
     check_plain,
     check_setting,
     point_of,
@@ -162,6 +161,9 @@ def design(given: Mapping[str, Any]) -> Design:
     controllers, matched = _controllers(given)
     factors = _factors(given.get("factors"))
     fixed = _fixed(given)
+    for path in given.get("set", {}):
+        if any(path in factor.paths for factor in factors):
+            raise OptionError("path", path, "leave one of them", "is in 'set', and of a factor")
     labels = (*controllers, MATCHED) if matched else controllers
     claims = read_claims(given.get("claims"), _robot(fixed), labels)
     values = sample(factors, count, seed)
@@ -191,7 +193,7 @@ def _fixed(given: Mapping[str, Any]) -> dict[str, Any]:
     if not isinstance(single, Mapping):
         raise OptionError("set", single, "a mapping of paths to values")
     for path in single:
-        check_path(path)
+        check_world_path("path in set", path)
     return settings_of(fixed, single)
 
 

@@ -14,11 +14,12 @@ from typing import Any
 
 import pandas as pd
 
+from artde_gym.evaluation.columns import check_metric
 from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.rollout import Episode
 from artde_gym.evaluation.tasks import Progress, Update, labels_of
 from artde_gym.evaluation.workers import check_picklable, check_workers, run_jobs
-from artde_gym.studies.multiverse.design import MATCHED, Design, World, load
+from artde_gym.studies.multiverse.design import MATCHED, Design, load
 from artde_gym.studies.multiverse.job import Job, Numbered, check_points, jobs_of, run
 from artde_gym.studies.multiverse.result import Multiverse, read_multiverse
 from artde_gym.studies.reproduce.reproduction import mean_gains
@@ -70,13 +71,16 @@ def multiverse(
     first = plan.points()
     if workers > 1:
         check_picklable({point.controller: point.spec for point in first.values()}, {})
+    for metric in {claim.metric for claim in plan.claims if claim.metric is not None}:
+        one = next(iter(first.values()))
+        check_metric(metric, one.cell, one.spec, one.seed)
     complete = True
     with SweepStore(Path(out)) as store:
         known = {**first, **_second_pass(plan, _stored(store))}
         as_sweep = SweepDesign(tuple(known.values()), 1, plan.vectorized, plan.text)
         refuse_others(as_sweep, store)
         _check(plan, first, store, on_progress)
-        types = parquet.types_of(_columns(plan.worlds[number], point) for (number, _), point in known.items())
+        types = parquet.types_of(_columns(plan, number, point) for (number, _), point in known.items())
         store.begin(plan.text, types, evidence_of(as_sweep), allow_mixed=allow_mixed)
         for what, points in ((_FIRST, lambda: first), (_SECOND, lambda: _second_pass(plan, _stored(store)))):
             complete = complete and _run(plan, points(), store, workers, on_progress and _named(on_progress, what))
@@ -148,13 +152,11 @@ def _run(
 def _rows(plan: Design, job: Job, results: list[Episode]) -> Iterator[dict[str, Any]]:
     for i, (point, result) in enumerate(zip(job.points, results, strict=True)):
         labels = {**labels_of(job.task, i), "controller": point.controller, "cell": point.id, "episode": 0}
-        yield {**labels, **_columns(plan.worlds[job.task.episodes[i]], point), **result.row}
+        yield {**labels, **_columns(plan, job.task.episodes[i], point), **result.row}
 
 
-def _columns(world: World, point: SweepCell) -> dict[str, Any]:
+def _columns(plan: Design, number: int, point: SweepCell) -> dict[str, Any]:
     """Return the columns that say which world it is."""
-    return {
-        **point.columns,
-        "world": world.number,
-        **{f"factor.{name}": value for name, value in world.factors.items()},
-    }
+    own = plan.worlds[number].factors
+    factors = {f"factor.{factor.name}": factor.stored(own[factor.name]) for factor in plan.factors}
+    return {**point.columns, "world": number, **factors}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -17,6 +18,11 @@ from artde_gym.studies.sweep.design import check_distribution, check_path, is_nu
 DISTRIBUTIONS = ("uniform", "log_uniform", "quantiles", "choice")
 KEYS = (*DISTRIBUTIONS, "path", "source", "unit")
 BITS = 64  # of a sample
+OWN = {
+    "controller": "all controllers meet every world: list them under 'controllers'",
+    "seed": "each world has its own, which the design's 'seed' determines",
+}
+"""Settings that no factor sets, and why."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,7 +67,7 @@ class Factor:
         if not isinstance(unit, str):
             raise OptionError(f"unit of {field}", unit, "a word")
         (kind,) = kinds
-        _check_values(f"{field}: {kind}", kind, given[kind])
+        _check_values(field, kind, given[kind])
         return cls(name, _paths(field, given.get("path")), kind, tuple(given[kind]), source, unit)
 
     @property
@@ -80,10 +86,28 @@ class Factor:
             return low + share * (high - low)
         return min(max(math.exp(math.log(low) + share * math.log(high / low)), low), high)
 
+    @property
+    def categories(self) -> tuple[str, ...]:
+        """Choices that are no numbers, as text, in their order; empty for numbers."""
+        if self.kind != "choice" or all(map(is_number, self.arguments)):
+            return ()
+        return tuple(dict.fromkeys(map(_text, self.arguments)))
+
     def numbers(self, values: Sequence[Any]) -> Array:
-        """Return values as numbers: what is no number by its place among the choices."""
-        numeric = self.kind != "choice" or all(map(is_number, self.arguments))
-        return np.array(values if numeric else [self.arguments.index(value) for value in values], dtype=np.float64)
+        """Return values as numbers: what is no number by its place among the categories."""
+        known = self.categories
+        return np.array([known.index(_text(value)) for value in values] if known else values, dtype=np.float64)
+
+    def stored(self, value: Any) -> Any:
+        """Return a value as a column of a table holds it: of choices of several types, or with parts, the text."""
+        plain = all(isinstance(one, (str, type(None))) for one in self.arguments)
+        plain = plain or all(isinstance(one, (bool, type(None))) for one in self.arguments)
+        plain = plain or all(one is None or is_number(one) for one in self.arguments)
+        return value if plain else _text(value)
+
+
+def _text(value: Any) -> str:
+    return value if isinstance(value, str) else json.dumps(value, sort_keys=True)
 
 
 def sample(factors: Sequence[Factor], count: int, seed: int) -> list[dict[str, Any]]:
@@ -104,8 +128,19 @@ def _paths(field: str, given: Any) -> tuple[str, ...]:
     if not (isinstance(paths, list) and paths and all(isinstance(path, str) for path in paths)):
         raise OptionError(f"path of {field}", given, "a path of a setting, or a list of some")
     for path in paths:
-        check_path(path)
+        check_world_path(f"path of {field}", path)
     return tuple(paths)
+
+
+def check_world_path(field: str, path: str) -> None:
+    """Refuse what is no path to a setting, or to one that a world does not have.
+
+    Raises:
+        OptionError, UnknownNameError: in these cases.
+    """
+    check_path(path)
+    if path in OWN:
+        raise OptionError(field, path, f"choose another path; {OWN[path]}", "is not a setting of a world")
 
 
 def _check_values(field: str, kind: str, values: Any) -> None:
@@ -114,4 +149,4 @@ def _check_values(field: str, kind: str, values: Any) -> None:
         return
     good = isinstance(values, list) and len(values) >= 2 and all(map(is_number, values))
     if not (good and values == sorted(values)):
-        raise OptionError(field, values, "two numbers or more, in ascending order")
+        raise OptionError(f"{field}.{kind}", values, "two numbers or more, in ascending order")

@@ -50,7 +50,7 @@ class Verdict:
 
     @property
     def most_favorable(self) -> int | None:
-        """Number of the world that bears the claim out by the largest margin; None if the claim says nothing."""
+        """Number of the world that bears the claim out by the largest margin; None where all are alike, or none is."""
         return self._extreme(1.0)
 
     @property
@@ -73,7 +73,8 @@ class Verdict:
             for number, outcome, margin in zip(self.worlds, self.outcome.tolist(), self.margin.tolist(), strict=True)
             if np.isfinite(outcome)
         ]
-        return -max(ranked)[2] if ranked else None
+        alike = len(ranked) > 1 and len({place[:2] for place in ranked}) == 1
+        return -max(ranked)[2] if ranked and not alike else None
 
 
 def verdict_of(claim: WorldClaim, found: WorldTable) -> Verdict:

@@ -326,7 +326,7 @@ def _within(estimates: Collection[Estimate], most: float) -> Outcome:
 
 def _missing(result: Result, scenario: str, controllers: tuple[str, ...]) -> Verdict | None:
     """Return a verdict if a controller has no episode."""
-    missing = [name for name in controllers if result.rows(scenario, name).empty]
+    missing = [name for name in controllers if not result.has(scenario, name)]
     return Verdict("not measured", f"no episodes of {', '.join(missing)}") if missing else None
 
 

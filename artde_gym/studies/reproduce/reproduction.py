@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from artde_gym.errors import OptionError, UnknownNameError, suggest_names
+from artde_gym.errors import OptionError
 from artde_gym.evaluation.cells import Cell
 from artde_gym.evaluation.environments import fastest_engine
 from artde_gym.evaluation.evaluate import run_plan
@@ -30,7 +30,7 @@ from artde_gym.evaluation.plan import Plan
 from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.store import write_atomically
 from artde_gym.evaluation.tasks import Update
-from artde_gym.kit import ROBOTS, RobotKit
+from artde_gym.kit import ROBOTS, RobotKit, find_robot
 from artde_gym.scenarios import scenario as find_scenario
 from artde_gym.studies.frontier.result import Frontier
 from artde_gym.studies.frontier.search import frontier
@@ -52,20 +52,24 @@ class Reproduction:
     curves: Mapping[tuple[str, str], Frontier] = dataclasses.field(default_factory=dict)
 
 
-def titles() -> list[str]:
-    """Return the titles of the robots that have scenarios to reproduce."""
-    return [kit.title for kit in ROBOTS.values() if kit.reproduced[0]]
+def reproducible() -> list[str]:
+    """Return the names of the robots that have scenarios to reproduce."""
+    return [name for name, kit in ROBOTS.items() if kit.reproduced[0]]
 
 
-def kit_of(title: str) -> RobotKit:
-    """Return the robot with this title.
+def kit_of(robot: str) -> RobotKit:
+    """Return the robot of this name or title.
 
     Raises:
-        UnknownNameError: if no robot with scenarios to reproduce has it.
+        UnknownNameError: if no robot with scenarios to reproduce has it, or several have this title.
     """
-    if title not in titles():
-        raise UnknownNameError("robot", title, suggest_names(title, titles()))
-    return next(kit for kit in ROBOTS.values() if kit.title == title)
+    return find_robot(robot, reproducible())
+
+
+def folder_name(robot: str) -> str:
+    """Return the name of a robot's folder: its title, unless another robot has the same."""
+    kit = kit_of(robot)
+    return kit.title if [ROBOTS[name].title for name in reproducible()].count(kit.title) == 1 else kit.name
 
 
 def scenarios_of(robot: str, names: Sequence[str] | None = None) -> tuple[str, ...]:
@@ -98,7 +102,7 @@ def reproduce(
     """Run a robot's scenarios with all its controllers and judge the claims made in them.
 
     Args:
-        robot: a robot's title, such as "biped" or "quadrotor".
+        robot: name of a robot, such as "ojas" or "q450"; its title will do where no other robot has it.
         out: folder to store everything in; the same call continues an interrupted one.
         scenarios: of this robot, in place of all that its kit names.
         controllers: in place of the kit's, without the ablation.

@@ -288,8 +288,8 @@ def _disturbed(settings: Mapping[str, Any], path: str, inside: str, value: Any) 
     given = settings["disturbances"]
     if given is None:
         if settings["scenario"] is None:
-            allowed = "with a scenario, or with disturbances ({} for no others)"
-            raise OptionError("path", path, allowed)
+            todo = "give one, or disturbances: {} for no others"
+            raise OptionError("path", path, todo, "needs a scenario whose disturbances it changes")
         given = find_scenario(settings["scenario"]).disturbances
     kind, _, parameter = inside.partition(".")
     if kind not in DISTURBANCES:

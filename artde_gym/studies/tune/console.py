@@ -40,6 +40,9 @@ def _comparison(found: Tuning, scenario: str) -> Table:
     assert result is not None
     table = _table("controller", "preset", "falls", "tuned", "falls", "change (%)")
     for name in found.best:
+        if not (result.has(scenario, name) and result.has(scenario, name + TUNED)):  # it was interrupted
+            table.add_row(name, *5 * ["-"])
+            continue
         cells: list[str] = []
         for label in (name, name + TUNED):
             falls, rate = result.falls(scenario, label)

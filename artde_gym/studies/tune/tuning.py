@@ -29,8 +29,9 @@ import pandas as pd
 
 from artde_gym.arguments import check_integer
 from artde_gym.deprecation import takes_old_names
-from artde_gym.errors import OptionError, suggest_names
+from artde_gym.errors import OptionError
 from artde_gym.evaluation import canonical
+from artde_gym.evaluation.columns import check_metric
 from artde_gym.evaluation.environments import metrics_spec_of, single, with_engine
 from artde_gym.evaluation.evaluate import run_plan
 from artde_gym.evaluation.gains import policy_for
@@ -102,7 +103,7 @@ def tune(
         trials: number per controller, the preset included.
         episodes: number per trial.
         held_out: number of episodes of the comparison.
-        metric: column of `episodes.csv` to minimize; None for the environment's first error.
+        metric: numeric column of `episodes.csv` to minimize; None for the environment's first error.
         seed: base seed of the proposals and training episodes; the comparison's episodes have those of seed + 1.
         out: results folder; repeat the call to resume.
         on_progress: called with the running part ("trial 3 of 50", "held-out") and the progress of its episodes.
@@ -127,6 +128,8 @@ def tune(
         allow_mixed=allow_mixed,
     )
     env_id = plan.cells[0].env_id
+    if metric is not None:
+        check_metric(metric, plan.cells[0], next(iter(plan.controllers.values())), plan.seed)
     search = _Search(plan, metric, on_progress)
     configuration = {
         "env": env_id,
@@ -239,8 +242,6 @@ def _best(rows: list[dict[str, Any]]) -> dict[str, Gains]:
 
 def _row(result: Result, name: str, number: int, metric: str, gains: Gains) -> dict[str, Any]:
     (scenario,) = result.scenarios
-    if metric not in result.episodes:
-        raise OptionError("metric", metric, suggest_names(metric, [*map(str, result.episodes)]))
     fell = result.values(scenario, name, "fell") > 0
     error = result.values(scenario, name, metric)
     cost = np.where(fell, FALL * (1 + 1 / (1 + result.values(scenario, name, "duration_s"))), error)

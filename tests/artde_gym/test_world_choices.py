@@ -1,0 +1,106 @@
+"""Choices of plausible worlds of any kind, settings that no factor sets, and worlds that are all alike."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from artde_gym.cli import app
+from artde_gym.errors import OptionError, StoreError
+from artde_gym.report import write_report
+from artde_gym.studies import multiverse, read_multiverse
+from artde_gym.studies.multiverse.design import design
+from artde_gym.studies.multiverse.factor import Factor
+
+pytest.importorskip("pyarrow", reason="pyarrow is not installed (extra sweep)")
+
+FLIGHT: dict[str, Any] = {
+    "env": "QuadInfinity-Payload-v0",
+    "disturbances": {},
+    "env_kwargs": {"duration": 0.1},
+    "controllers": ["tde", "artde"],
+    "vectorized": True,
+    "worlds": 4,
+}
+CHOICES = {
+    "vectors": ("disturbances.payload.position", [[0, 0, -0.1], [0, 0, -0.2]]),
+    "mappings": ("disturbances", [{}, {"wind": 1.0}]),
+    "mixed": ("disturbances.payload.mass", [{"uniform": [0.1, 0.5]}, 0.3]),
+    "numbers": ("disturbances.payload.mass", [0.1, 0.3]),
+    "words": ("env_kwargs.measurement", ["ideal", "mocap"]),
+}
+
+
+def flight(path: str, values: list[Any], **others: Any) -> dict[str, Any]:
+    return {**FLIGHT, "factors": {"x": {"path": path, "choice": values, "source": "a guess"}}, **others}
+
+
+@pytest.mark.parametrize("kind", CHOICES)
+def test_worlds_may_choose_between_values_of_any_kind(kind: str, tmp_path: Path) -> None:
+    path, values = CHOICES[kind]
+    made = flight(path, values, disturbances={"payload": 0.3} if kind == "vectors" else {})
+    found = multiverse(made, tmp_path)
+    assert found.complete
+    chosen = [world.factors["x"] for world in found.design.worlds]
+    assert all(value in chosen for value in values)
+    assert len(set(found.episodes["factor.x"].tolist())) == 2
+    assert set(found.factors([0, 1, 2, 3]).ravel().tolist()) == ({0.1, 0.3} if kind == "numbers" else {0.0, 1.0})
+    again = multiverse(made, tmp_path)  # nothing is left to do, and the folder can be read
+    assert len(again.episodes) == len(found.episodes)
+    assert "0: " in write_report(tmp_path).read_text(encoding="utf-8") or kind == "numbers"
+
+
+def test_choices_of_several_types_are_stored_as_text() -> None:
+    factor = Factor.of("x", {"path": "disturbances", "choice": [{"wind": 1.0}, 0.3, "on"], "source": "a guess"})
+    assert [factor.stored(value) for value in factor.arguments] == ['{"wind": 1.0}', "0.3", "on"]
+    assert factor.numbers([0.3, {"wind": 1.0}]).tolist() == [1.0, 0.0]
+
+
+@pytest.mark.parametrize("path", ["controller", "seed"])
+def test_no_factor_sets_what_all_worlds_share_or_have_of_their_own(path: str) -> None:
+    with pytest.raises(OptionError, match=f"'{path}' is not a setting of a world"):
+        design(flight(path, ["tde", "artde"]))
+    with pytest.raises(OptionError, match=f"'{path}' is not a setting of a world"):
+        design(flight("disturbances.payload.mass", [0.1], set={path: "tde"}))
+
+
+def test_a_path_is_set_once() -> None:
+    with pytest.raises(OptionError, match="in 'set', and of a factor"):
+        design(flight("disturbances.payload.mass", [0.1], set={"disturbances.payload.mass": 0.2}))
+
+
+def test_the_message_names_the_distribution_once() -> None:
+    factors = {"x": {"path": "env_kwargs.speed", "uniform": [3, 0], "source": "a guess"}}
+    with pytest.raises(OptionError, match=r"^factor 'x'\.uniform is \[3, 0\]"):
+        design({**FLIGHT, "factors": factors})
+
+
+def test_a_path_to_a_disturbance_asks_for_a_scenario() -> None:
+    with pytest.raises(OptionError, match="needs a scenario"):
+        design(flight("disturbances.wind.scale", [1.0], disturbances=None)).points()
+
+
+def test_where_all_worlds_are_alike_none_is_the_most_favorable(tmp_path: Path) -> None:
+    file = tmp_path / "design.yaml"
+    file.write_text(
+        "env: QuadInfinity-Payload-v0\ndisturbances: {}\nenv_kwargs: {duration: 0.1}\ncontrollers: [tde, artde]\n"
+        "vectorized: true\nworlds: 2\nfactors: {x: {path: disturbances.payload.mass, choice: [0.1, 0.2], source: x}}\n"
+        "claims: [{survives: [artde, tde]}]\n"
+    )
+    words = ["multiverse", "--design", str(file), "--out", str(tmp_path / "out"), "--workers", "1"]
+    outcome = CliRunner().invoke(app, words)
+    assert outcome.exit_code == 0, outcome.output
+    assert "favorable" not in outcome.output
+    (verdict,) = read_multiverse(tmp_path / "out").verdicts
+    assert (verdict.most_favorable, verdict.least_favorable) == (None, None)
+
+
+def test_a_folder_without_an_episode_has_nothing_to_report(tmp_path: Path) -> None:
+    multiverse(flight("disturbances.payload.mass", [0.1, 0.2]), tmp_path)
+    for file in tmp_path.rglob("*.parquet"):
+        file.unlink()
+    with pytest.raises(StoreError, match="no finished episode"):
+        write_report(tmp_path)
