@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -13,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from artde_gym.arguments import check_number
-from artde_gym.cli.arguments import EnvKwargs, joined, json_object
+from artde_gym.cli.arguments import WALK, EnvKwargs, joined, json_object
 from artde_gym.cli.workspace_design import show_workspace
 from artde_gym.errors import OptionError
 from artde_gym.evaluation.environments import robot_of
@@ -32,7 +33,7 @@ NAMES = [robot for robot in designed() if robot in ROBOTS]
 
 
 def design(
-    robot: Annotated[str | None, typer.Option(help=f"{' or '.join(NAMES)}. Default: ojas.")] = None,
+    robot: Annotated[str | None, typer.Option(help=f"{' or '.join(NAMES)}. Default: that of {WALK}.")] = None,
     env: Annotated[str | None, typer.Option(help="Environment id, in place of the robot.")] = None,
     env_kwargs: EnvKwargs = None,
     law: Annotated[str, typer.Option(help=f"{', '.join((*DELAYED, *SWITCHED))}.")] = "tde",
@@ -77,7 +78,7 @@ def design(
     if env is not None and DRIVES[name].workspace is not None:
         show_workspace(env, given, law, chosen, period, figure, as_json)
         return
-    check_motion(name, (DRIVES[name].supports if switches else DRIVES[name].loops) or dict, given)
+    check_motion(name, _motion(name, switches), given)
     if switches:
         limit = {} if cap is None else {"cap": cap}
         _show_supports(name, law, design_supports(name, law, preset, **limit, gains=chosen, **given), as_json)
@@ -95,18 +96,34 @@ def design(
 
 
 def _robot(robot: str | None, env: str | None) -> str:
-    """Return the name of a robot that is given as such or by an environment.
+    """Return the name of the robot that is given as such or by an environment.
 
     Raises:
         OptionError: for an unknown one, or both.
     """
-    if env is None:
-        return find_robot("ojas" if robot is None else robot, NAMES).name
-    if robot is not None:
+    if robot is not None and env is not None:
         raise OptionError("robot", robot, "none with an environment")
+    if robot is not None:
+        return find_robot(robot, NAMES).name
+    env = WALK if env is None else env
     if (name := robot_of(env)) not in NAMES:
         raise OptionError("env", env, f"an environment of {' or '.join(NAMES)}")
     return name
+
+
+def _motion(name: str, switches: bool) -> Callable[..., Any]:
+    """Return the function that has the arguments of a robot's motion.
+
+    Raises:
+        OptionError: if the law switches and the robot has no phases of support.
+    """
+    drive = DRIVES[name]
+    if switches and drive.supports is None:
+        walkers = [one for one in NAMES if DRIVES[one].supports is not None]
+        raise OptionError("robot of a law that switches", name, ", ".join(map(repr, walkers)))
+    function = drive.supports if switches else drive.loops
+    assert function is not None
+    return function
 
 
 def _refuse_idle(switches: bool, period: float | None, cap: float | None, figure: Path | None) -> None:

@@ -140,8 +140,8 @@ def test_the_command_derives_gains_for_another_gait() -> None:
         (["--law", "tde-switched", "--figure", "x.svg"], "figure"),
         (["--law", "tde-switched", "--period", "0.004"], "period"),
         (["--law", "tde", "--cap", "0.05"], "cap"),
-        (["--law", "tde-switched", "--robot", "arm"], "'arm'; allowed: 'biped'"),
-        (["--law", "artde-switched", "--robot", "quadrotor"], "'quadrotor'; allowed: 'biped'"),
+        (["--law", "tde-switched", "--robot", "arm"], "'arm'; allowed: 'ojas'"),
+        (["--law", "artde-switched", "--robot", "q450"], "'q450'; allowed: 'ojas'"),
     ],
 )
 def test_the_command_ignores_no_option(options: list[str], words: str) -> None:
