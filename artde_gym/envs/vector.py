@@ -18,11 +18,11 @@ from numpy.typing import ArrayLike, NDArray
 from artde_gym.arguments import check_seed, real_array
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
-from artde_gym.disturbances.numeric import Words, numeric_rows
+from artde_gym.disturbances.numeric import numeric_rows
 from artde_gym.disturbances.schedule import EVENTS
 from artde_gym.envs.closed_env import require_open
-from artde_gym.envs.options import disturbances_in, warn_of_idle
-from artde_gym.envs.step_limit import StepLimitMixin
+from artde_gym.envs.disturbed import DisturbedMixin
+from artde_gym.envs.options import disturbances_in, user_level
 from artde_gym.errors import ActionError, OptionError
 from artde_gym.info import FELL, REWARD, Columns, Mask, SampledTable, cleared, masked, prefixed
 from artde_gym.layout import Layout
@@ -32,7 +32,7 @@ from artde_gym.sim.factory import resolve_engine
 Order = Literal["C", "F"]
 
 
-class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
+class BaseVectorEnv(DisturbedMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
     """Many environments in one, each with its own random generator and independent of their number.
 
     A subclass defines the task; observations and actions are (n, size), in its memory `order`.
@@ -56,15 +56,11 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
     order: ClassVar[Order] = "C"
     action_layout: Layout
     observation_layout: Layout
-    robot_name: ClassVar[str]
     metrics_spec: MetricsSpec
     reward_scales: ClassVar[Mapping[str, float]]
     fall_reasons: ClassVar[Sequence[str]]
     allowed_action: ClassVar[str]
     own_engine: ClassVar[str]
-    control_period: float
-    words: Words
-    _disturbances: Disturbances
     _apart: Sequence[Disturbances] = ()  # of each environment, where they differ
     _np_random: Any  # a list with one entry per environment, as the seeds
     _np_random_seed: Any
@@ -103,9 +99,10 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
         self._sampled: list[Mapping[str, Any]] = [{}] * num_envs
         self._table = SampledTable(num_envs)
 
-    @abc.abstractmethod
-    def _parse(self, disturbances: Mapping[str, Any]) -> Disturbances:
-        """Parse disturbances of this robot."""
+    def _set_episodes(self, last: int, disturbances: Mapping[str, Any] | None) -> None:
+        """Set the length of an episode (control periods), unless it is limited to fewer, and the disturbances."""
+        self._last = min(last, self._limit or last)
+        self._disturb(disturbances)
 
     @abc.abstractmethod
     def _start(self, drawn: Mapping[int, Mapping[str, Any]]) -> None:
@@ -230,7 +227,7 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
                 warnings.warn(
                     f"{type(self).__name__} uses engine {self.own_engine!r}, but gym.make uses {default!r} by default: "
                     f"results will differ; pass engine={self.own_engine!r} to silence this warning",
-                    stacklevel=6,  # where gymnasium.make_vec was called
+                    stacklevel=user_level(),
                 )
         elif engine != self.own_engine:
             allowed = f"{self.own_engine!r}; for engine {engine!r}: gym.make_vec(..., vectorization_mode='sync')"
@@ -246,7 +243,7 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
             allowed = f"a mapping, or a list of {self.num_envs}, one for each environment"
             raise OptionError("disturbances", f"a list of {len(given)}", allowed)
         for one in self._apart or (self._disturbances,):
-            warn_of_idle(one, self._last * self.control_period)
+            self._warn_of_idle(one)
 
     def _renew(
         self, observations: Array, info: dict[str, Any], told: Columns, ended: Mask
