@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium as gym
 import numpy as np
@@ -26,7 +26,7 @@ class Cart(BaseEnv):
     action_layout = Layout((Field("force", 1, "N", -2.0, 2.0, "force"),))
     robot_name = "arm"  # whose kinds of disturbances it takes
     words, time_step, allowed_action = {"site": ("cart",), "joint": ()}, 0.01, "force (N)"
-    reward_scales: Mapping[str, float] = {"near": 2.0, "alive": 0.5}
+    reward_scales: ClassVar[Mapping[str, float]] = {"near": 2.0, "alive": 0.5}
     fall_reasons = ("left",)
 
     def __init__(self, disturbances: Any = None, render_mode: str | None = None) -> None:
@@ -83,7 +83,7 @@ def test_a_subclass_is_guarded_and_told_about() -> None:
 
 
 def test_a_subclass_has_a_spec_with_its_steps() -> None:
-    gym.register("Cart-v0", Cart, disable_env_checker=True)
+    gym.register("Cart-v0", f"{__name__}:Cart", disable_env_checker=True)
     try:
         env = gym.make("Cart-v0")
         assert env.spec is not None
