@@ -123,10 +123,10 @@ class QuadInfinityPayloadVectorEnv(BaseVectorEnv):
 
     def _advance(self, commands: Array, goes_on: Mask) -> dict[int, list[str]]:
         self._before = [fleet.thrusts for _, fleet in self._fleets]
-        waiting = ~goes_on & (self.autoreset_mode is AutoresetMode.DISABLED)
+        waits = self.autoreset_mode is AutoresetMode.DISABLED and not goes_on.all()
         events: dict[int, list[str]] = {}
         for part, fleet in self._fleets:
-            still = np.flatnonzero(waiting[part])
+            still = np.flatnonzero(~goes_on[part]) if waits else np.zeros(0, np.int64)
             motion = fleet.motion(still) if still.size else []
             told = fleet.advance(commands[part].T).items()
             if motion:

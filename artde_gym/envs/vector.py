@@ -95,6 +95,8 @@ class BaseVectorEnv(DisturbedMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
         seeded = [seeding.np_random() for _ in range(num_envs)]
         self._np_random, self._np_random_seed = map(list, zip(*seeded, strict=True))
         self._k = np.zeros(num_envs, np.int64)
+        self._all = np.ones(num_envs, np.bool_)
+        self._reason_names = [FELL + name for name in self.fall_reasons]
         self._over: Mask | None = None  # where an episode has ended; None before the first reset
         self._sampled: list[Mapping[str, Any]] = [{}] * num_envs
         self._table = SampledTable(num_envs)
@@ -205,7 +207,7 @@ class BaseVectorEnv(DisturbedMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
         truncated = (self._k >= self._last) & goes_on
         ended = terminated | truncated
         told = cleared(prefixed(REWARD, terms), over) | self._counts(events) | self._reasons(terminated, falls)
-        info = self._info(np.ones_like(over), told)
+        info = self._info(self._all, told)
         if self.autoreset_mode is AutoresetMode.NEXT_STEP:
             self._over = ended.copy()
         elif ended.any():
@@ -253,7 +255,7 @@ class BaseVectorEnv(DisturbedMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
         self._begin(ended)
         renewed = self._truth()
         self._measure(renewed, ended)
-        begun = self._info(np.ones_like(ended), cleared(told, ended))
+        begun = self._info(self._all, cleared(told, ended))
         return renewed, begun | masked(final, ended.copy())
 
     def _commands(self, actions: ArrayLike) -> Array:
@@ -268,7 +270,7 @@ class BaseVectorEnv(DisturbedMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
         if not finite.all():
             i = int(np.flatnonzero(~finite.all(axis=1))[0])
             raise ActionError(f"action of environment {i}", commands[i].tolist(), f"finite {self.allowed_action}")
-        return np.clip(commands, self._low, self._high, out=commands)
+        return commands.clip(self._low, self._high, commands)
 
     def _mask(self, given: Any) -> Mask:
         if given is None:
@@ -324,10 +326,12 @@ class BaseVectorEnv(DisturbedMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
 
     def _reasons(self, terminated: Mask, falls: Sequence[Mask]) -> Columns:
         """Mark the first reason that holds where an episode was terminated."""
-        reasons: Columns = {}
+        reasons: Columns = dict(zip(self._reason_names, np.zeros((len(falls), self.num_envs), np.bool_), strict=True))
+        if not terminated.any():
+            return reasons
         left = terminated
-        for name, fell in zip(self.fall_reasons, falls, strict=True):
-            reasons[FELL + name] = fell & left
+        for name, fell in zip(self._reason_names, falls, strict=True):
+            reasons[name] = fell & left
             left = left & ~fell
         return reasons
 
