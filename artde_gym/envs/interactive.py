@@ -53,7 +53,7 @@ class InteractiveMixin(DisturbedMixin, abc.ABC):
         """
         given = {"payload": {**payload, "attach_time": self.elapsed * self.time_step}}
         sampled = self._parse(given).sample(np.random.default_rng(0))
-        added = self.schedule.attach(self.elapsed, sampled["payload"])
+        added = self.schedule.attach(self.elapsed, self._mounted(sampled)["payload"])
         if added:
             self._sample({**self._sampled, **sampled})
         return added
@@ -65,6 +65,10 @@ class InteractiveMixin(DisturbedMixin, abc.ABC):
             payload = {**self._sampled["payload"], "detach_time": self.elapsed * self.time_step}
             self._sample({**self._sampled, "payload": payload})
         return dropped
+
+    def _mounted(self, sampled: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return sampled disturbances with the payload's position in the frame of the body that carries it."""
+        return sampled
 
     @property
     def sampled_disturbances(self) -> dict[str, Any]:

@@ -72,9 +72,12 @@ class JointEnv(EngineEnv, Generic[Task]):
     def _parse(self, disturbances: Mapping[str, Any]) -> Disturbances:
         return self._task.parse(disturbances)
 
+    def _mounted(self, sampled: Mapping[str, Any]) -> Mapping[str, Any]:
+        return self._task.placed(sampled)
+
     def _begin(self, sampled: Mapping[str, Any]) -> None:
         self._place(sampled)
-        placed = self._task.placed(sampled)
+        placed = self._mounted(sampled)
         self._active = EpisodeDisturbances(placed, self._task, self.np_random, self.observation_layout)
         self._active.start(self._engine)
         self.schedule = self._active.schedule

@@ -113,3 +113,21 @@ def test_warnings_point_at_the_line_of_the_user(name: str) -> None:
     late = {"duration": 0.1, "disturbances": LATE}
     assert lines_of(lambda: gym.make(name, engine="mujoco", **late)) == {__file__}
     assert lines_of(lambda: gym.make_vec(name, 1, "vector_entry_point", **late)) == {__file__}
+
+
+@pytest.mark.parametrize("name", [name for name in ours() if not name.startswith("Biped")])  # which settles anew
+def test_a_payload_attached_on_demand_is_that_of_the_same_disturbance(name: str, engine_name: Any) -> None:
+    """What live play records is what an episode with the recorded disturbances does."""
+    arguments: dict[str, Any] = {"engine": engine_name, "disable_env_checker": True, "duration": 0.3}
+    played: Any = gym.make(name, disturbances={}, **arguments).unwrapped
+    played.reset(seed=0)
+    action = 0.5 * (played.action_space.low + played.action_space.high)
+    for _ in range(4):
+        played.step(action)
+    assert played.add_payload({"mass": 0.3})
+    again: Any = gym.make(name, disturbances=played.sampled_disturbances, **arguments).unwrapped
+    again.reset(seed=0)
+    for _ in range(4):
+        again.step(action)
+    for _ in range(6):
+        assert played.step(action)[0].tolist() == again.step(action)[0].tolist()
