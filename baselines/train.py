@@ -14,7 +14,7 @@ import torch
 from numpy.typing import NDArray
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.logger import configure
+from stable_baselines3.common.logger import Logger, configure
 from stable_baselines3.common.utils import set_random_seed
 from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv, VecMonitor, VecNormalize
 
@@ -73,6 +73,7 @@ class Trainer:
             self.model = _model(training, self.env, options, residual.features)
         except (AssertionError, TypeError, ValueError, MemoryError) as error:  # Stable-Baselines3's own checks
             raise TrainingError("options", options, f"arguments that go together ({error})") from error
+        self.model.set_logger(Logger(None, []))  # the default one makes a folder, even without anything to write
         self.interval = SAC_INTERVAL
         if training.algo == "ppo":
             self.interval = task.rollouts * options["n_steps"] * env.num_envs

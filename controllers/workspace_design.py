@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artde_gym.multibody.spec import RobotSpec
-from artde_gym.robots.arm.workspace import TIME_STEP, largest_weight, smallest_inertia, workspace_inertia
+from artde_gym.robots.arm.workspace import largest_weight, smallest_inertia, workspace_inertia
+from artde_gym.robots.joint_task import TIME_STEP
 from controllers.arm_design import LEVEL, LOADED, MARGIN, ArmGains, design_arm, stable_factors
 from controllers.laws.errors import GainError
 from controllers.laws.stability import largest_m_bar, tde_eigenvalues

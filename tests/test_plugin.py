@@ -83,7 +83,7 @@ for _ in range(3):
     for _ in range(10):  # 20 ms
         action, state = policy.predict(observation, state)
         observation, *_ = plain.step(action)
-assert env.unwrapped._observation().tobytes() == observation.tobytes()
+assert env.unwrapped._measure().tobytes() == observation.tobytes()
 assert {"residual_tracking", "residual_effort"} <= info.keys()
 agent.step(np.ones(2))
 assert 0 < env.unwrapped._q[0] != plain.unwrapped._q[0]

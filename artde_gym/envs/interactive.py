@@ -9,27 +9,21 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from artde_gym.disturbances import Disturbances
-from artde_gym.disturbances.numeric import Words, numeric
+from artde_gym.disturbances.numeric import numeric
 from artde_gym.disturbances.schedule import Push, Schedule
-from artde_gym.envs.closed_env import CLOSED, require_open
-from artde_gym.envs.step_limit import StepLimitMixin
+from artde_gym.envs.disturbed import DisturbedMixin
 from artde_gym.errors import RobotError
 from artde_gym.info import EpisodeInfo
-from artde_gym.motion.motion import Pose
-from artde_gym.multibody.spec import RobotSpec, Vector
-from artde_gym.sim.engine import Engine
+from artde_gym.multibody.spec import Vector
 
 
-class InteractiveMixin(StepLimitMixin, abc.ABC):
-    """A mixin of environments: pushes and drops on demand, and access to the engine."""
+class InteractiveMixin(DisturbedMixin, abc.ABC):
+    """A mixin of environments: pushes, payloads and drops on demand."""
 
-    nominal_robot: RobotSpec
-    _engine: Engine
-    _sampled: Mapping[str, Any]
-    words: Words
-    robot_name: ClassVar[str]
+    time_step: ClassVar[float]  # s, of the physics
     fall_reasons: ClassVar[Sequence[str]]
+    schedule: Schedule  # of this episode's events
+    _sampled: Mapping[str, Any]
 
     def __copy__(self) -> Self:
         return copy.deepcopy(self)  # environments cannot share an engine
@@ -38,17 +32,6 @@ class InteractiveMixin(StepLimitMixin, abc.ABC):
     @abc.abstractmethod
     def elapsed(self) -> int:
         """Physics steps since the reset."""
-
-    @property
-    @abc.abstractmethod
-    def schedule(self) -> Schedule:
-        """The scheduled events of this episode."""
-
-    def pose(self) -> Pose:
-        """Read where robot and payload are, as they are and not as sensors see them."""
-        state = self._engine.state()
-        payload, loads = self._engine.payload_position(), self._engine.foot_loads()
-        return Pose(state.position, state.quat_xyzw, state.q, payload, loads)
 
     def push(self, site: str, force: Vector, duration: float = 0.2) -> None:
         """Push at a site of the robot with `force` (N, world axes) for `duration` (s), starting now.
@@ -59,7 +42,7 @@ class InteractiveMixin(StepLimitMixin, abc.ABC):
         sites = self.words["site"]
         if site not in sites:
             raise RobotError("site", site, ", ".join(map(repr, sites)))
-        first, steps = self.elapsed, max(1, round(duration / self._engine.time_step))
+        first, steps = self.elapsed, max(1, round(duration / self.time_step))
         self.schedule.add(Push(site, force, first, first + steps))
 
     def add_payload(self, payload: Mapping[str, Any]) -> bool:
@@ -68,10 +51,9 @@ class InteractiveMixin(StepLimitMixin, abc.ABC):
         Raises:
             DisturbanceError: for a payload that the robot cannot carry.
         """
-        given = {"payload": {**payload, "attach_time": self.elapsed * self._engine.time_step}}
-        parsed = Disturbances.parse(given, self.words["site"], self.words["joint"], self.robot_name)
-        sampled = parsed.sample(np.random.default_rng(0))
-        added = self.schedule.attach(self.elapsed, sampled["payload"])
+        given = {"payload": {**payload, "attach_time": self.elapsed * self.time_step}}
+        sampled = self._parse(given).sample(np.random.default_rng(0))
+        added = self.schedule.attach(self.elapsed, self._mounted(sampled)["payload"])
         if added:
             self._sample({**self._sampled, **sampled})
         return added
@@ -80,9 +62,13 @@ class InteractiveMixin(StepLimitMixin, abc.ABC):
         """Drop the payload now; return False if there is none."""
         dropped = self.schedule.drop(self.elapsed)
         if dropped:
-            payload = {**self._sampled["payload"], "detach_time": self.elapsed * self._engine.time_step}
+            payload = {**self._sampled["payload"], "detach_time": self.elapsed * self.time_step}
             self._sample({**self._sampled, "payload": payload})
         return dropped
+
+    def _mounted(self, sampled: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return sampled disturbances with the payload's position in the frame of the body that carries it."""
+        return sampled
 
     @property
     def sampled_disturbances(self) -> dict[str, Any]:
@@ -91,11 +77,3 @@ class InteractiveMixin(StepLimitMixin, abc.ABC):
 
     def _sample(self, sampled: Mapping[str, Any]) -> None:
         self._sampled, self._told = sampled, EpisodeInfo(numeric(sampled, self.words), self.fall_reasons)
-
-    def _require_open(self) -> None:
-        require_open(closed=self._engine is CLOSED)
-
-    @property
-    def engine(self) -> Engine:
-        """The physics engine, for reading."""
-        return self._engine

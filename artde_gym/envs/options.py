@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import warnings
 from collections.abc import Mapping
 from typing import Any
@@ -14,7 +15,15 @@ from artde_gym.scenarios import scenario
 def warn_of_idle(disturbances: Disturbances, duration: float) -> None:
     """Warn of disturbances that can never happen in an episode of `duration` seconds."""
     for text in disturbances.idle(duration):
-        warnings.warn(text, stacklevel=5)  # where gymnasium.make was called
+        warnings.warn(text, stacklevel=user_level())
+
+
+def user_level() -> int:
+    """Return the `stacklevel` of a warning that points at the user's line, which calls `gym.make` or `reset`."""
+    frame, level = inspect.currentframe(), 0
+    while frame is not None and frame.f_globals.get("__name__", "").split(".")[0] in ("artde_gym", "gymnasium"):
+        frame, level = frame.f_back, level + 1
+    return level
 
 
 def disturbances_in(options: Mapping[str, Any], env: Any) -> Any:

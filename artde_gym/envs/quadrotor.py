@@ -3,35 +3,28 @@
 from __future__ import annotations
 
 import math
-import operator
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal, cast
 
-import gymnasium as gym
 import numpy as np
-from numpy.typing import NDArray
 
-from artde_gym.arguments import action_array, check_seed, known_arguments, steps_per_period
-from artde_gym.arrays import Array, total
+from artde_gym.arguments import known_arguments, steps_per_period
+from artde_gym.arrays import Array
 from artde_gym.disturbances.effects import Effects, load_base
 from artde_gym.disturbances.ground_effect import thrust_gain
 from artde_gym.disturbances.noise import draw_keys
 from artde_gym.disturbances.schedule import Schedule
 from artde_gym.disturbances.wind import GRID, Wind
-from artde_gym.envs.closed_env import CLOSED
 from artde_gym.envs.documentation import filled
-from artde_gym.envs.interactive import InteractiveMixin
-from artde_gym.envs.options import disturbances_in, warn_of_idle
+from artde_gym.envs.engine_env import EngineEnv
 from artde_gym.envs.quadrotor_sensors import Measurement, Sensors
-from artde_gym.envs.view import View
-from artde_gym.errors import OptionError
 from artde_gym.kit import PAYLOAD
 from artde_gym.multibody.spec import Vector
 from artde_gym.robots.q450 import model as robot
 from artde_gym.robots.q450 import task
 from artde_gym.robots.q450.rotors import Rotors
 from artde_gym.sim.engine import Camera, Engine
-from artde_gym.sim.factory import EngineName, make_engine, resolve_engine
+from artde_gym.sim.factory import EngineName
 from artde_gym.sim.rotation import matrix
 from artde_gym.sim.sling import Sling
 
@@ -48,7 +41,7 @@ _NO_JOINTS = np.zeros(0)
 
 
 @filled(shared=task.DOCUMENTATION)
-class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any]]):
+class QuadInfinityPayloadEnv(EngineEnv):
     """A quadrotor flies an infinity-shaped path with a payload, drops it, and flies the path again.
 
     ## Description
@@ -84,8 +77,8 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
         DisturbanceError: for a malformed disturbance.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}
-
+    time_step = TIME_STEP
+    allowed_action = "[u1 (N), u2, u3, u4 (Nm)]"
     action_layout = task.ACTION
     observation_layout = task.OBSERVATION
     robot_name: ClassVar[str] = "q450"
@@ -109,137 +102,58 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
         height: int = 480,
         render_mode: Literal["rgb_array"] | None = None,
     ) -> None:
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise OptionError("render_mode", render_mode, "None, 'rgb_array'")
-        self.render_mode = render_mode
-        self._disturbances = task.parse(self.default_disturbances if disturbances is None else disturbances)
+        self.measurement, self.duration = measurement, duration
         self._ticks = steps_per_period(control_period, GRID)
-        self.control_period = self._ticks * GRID
-        self.measurement = measurement
-        self.duration = duration
-        self._sensors = Sensors(1, measurement, self.control_period, np.float64, self.observation_layout)
+        period, steps = self._ticks * GRID, self._ticks * STEPS
         self.nominal_robot = robot.q450()
-        self._plan = task.plan(duration, self.control_period, self.lift)
-        self._last = len(self._plan) - 1
-        self.observation_space = self.observation_layout.box()
-        self.action_space = task.ACTION.box()
-        self._low, self._high = self.action_space.low, self.action_space.high
-        self.engine_name = resolve_engine(engine)
-        engine_alone = make_engine(self.engine_name, self.nominal_robot, TIME_STEP, renders=render_mode is not None)
-        self._sling = Sling(engine_alone)
-        self._engine = cast(Engine, self._sling)
+        self._plan = task.plan(duration, period, self.lift)
+        super().__init__(
+            disturbances, control_period=period, substeps=steps, last=len(self._plan) - 1, render_mode=render_mode
+        )
+        self._sensors = Sensors(1, measurement, period, np.float64, self.observation_layout)
         x, y, z = PATH_CENTER
-        self._home: Vector = (x, y, z + self.lift)
-        camera = CAMERA._replace(target=self._home, width=width, height=height)
-        self.view = View(self._engine, camera, self.control_period, CAMERA_SHARE, CAMERA_SLACK)
-        self.metadata = {**self.metadata, **self.view.metadata}
+        self._center: Vector = (x, y, z + self.lift)
+        camera = CAMERA._replace(target=self._center, width=width, height=height)
+        self._open(engine, self.nominal_robot, camera, share=CAMERA_SHARE, slack=CAMERA_SLACK)
         self._engine.reset(task.start({}, self.lift), _NO_JOINTS)
         self._placed = self._engine.save_state()
-        self._k, self._over = 0, True  # no step before the first reset
-        self._schedule = Schedule({}, TIME_STEP)
         self._effects = Effects(1, self.words)
-        self._sample({})
-        warn_of_idle(self._disturbances, self._last * self.control_period)
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
-        """Start a flight; the class' documentation lists the `options`.
+    def _equipped(self, engine: Engine) -> Engine:
+        self._sling = Sling(engine)
+        return cast(Engine, self._sling)
 
-        Raises:
-            OptionError: for an unknown option, or a scenario of another environment.
-            DisturbanceError: for a malformed disturbance.
-        """
-        self._require_open()
-        disturbances = disturbances_in(options or {}, self)
-        if disturbances is not None:
-            self._disturbances = task.parse(disturbances)
-            warn_of_idle(self._disturbances, self._last * self.control_period)
-        super().reset(seed=check_seed("seed", seed))
-        sampled = self._disturbances.sample(self.np_random)
-        self._sample(sampled)
-        self._begin(sampled, draw_keys(self.np_random, task.STREAMS))
-        self.view.reset()
-        return self._measure(), self._info(dict.fromkeys(self.reward_scales, 0.0), (), ())
+    def _home(self) -> Vector:
+        return self._center
 
-    def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Apply a wrench for one control period.
+    def _lines(self) -> dict[str, Any]:
+        return {"path": self._plan[:, :3], "cable": self._sling.curve()}
 
-        Raises:
-            ActionError: for a wrong shape or a value that is not finite.
-            gymnasium.error.ResetNeeded: after the end of the flight, or before the first reset.
-        """
-        self._require_open()
-        if self._over:
-            raise gym.error.ResetNeeded("the flight is over or has not begun: call reset()")
-        action = action_array(action, 4, "[u1 (N), u2, u3, u4 (Nm)]")
-        before = self._rotors.thrusts
-        events = self._simulate(np.minimum(np.maximum(action, self._low), self._high).tolist())
-        self._k += 1
-        observation = self._measure()
-        terms = self._reward_terms(before)
-        reward = self.control_period * total(map(operator.mul, self.reward_scales.values(), terms.values()))
-        falls = self._falls()
-        terminated, truncated = any(falls), self._k >= self._last
-        self._over = terminated or truncated
-        return observation, reward, terminated, truncated, self._info(terms, falls, events)
-
-    def render(self) -> NDArray[np.uint8] | None:
-        """Draw a frame from a camera that follows the vehicle half-way; return None without a render mode."""
-        self._require_open()
-        if self.render_mode is None:
-            return None
-        step = self.elapsed
-        pushes = self._schedule.acting(step)
-        path = self._plan[:, :3]
-        cable = self._sling.curve()
-        return self.view.picture(
-            step * TIME_STEP, self._home, pushes, self._sampled, path=path, cable=cable, over=self._over
-        )
-
-    def close(self) -> None:
-        self._engine.close()
-        self._engine = self.view = CLOSED
-
-    @property
-    def elapsed(self) -> int:
-        return self._k * self._ticks * STEPS
-
-    @property
-    def schedule(self) -> Schedule:
-        return self._schedule
-
-    def _begin(self, sampled: Mapping[str, Any], keys: NDArray[np.uint64]) -> None:
-        """Set up an episode with the vehicle at rest in equilibrium."""
-        engine = self._engine
+    def _begin(self, sampled: Mapping[str, Any]) -> None:
+        engine, keys = self._engine, draw_keys(self.np_random, task.STREAMS)
         engine.restore_state(self._placed)
         if "initial_position" in sampled:
             engine.reset(task.start(sampled, self.lift), _NO_JOINTS)
         engine.scale_masses(sampled.get("mass_scale", {}).get("factor", 1.0))
-        self._schedule = Schedule(sampled, TIME_STEP)
-        self._schedule.start(engine)
-        self._rotors = Rotors(sampled, task.hover_thrusts(sampled, self.lift), TIME_STEP, self._ticks * STEPS)
+        self.schedule = Schedule(sampled, TIME_STEP)
+        self.schedule.start(engine)
+        self._rotors = Rotors(sampled, task.hover_thrusts(sampled, self.lift), TIME_STEP, self._substeps)
         self._wrench = robot.MIXER @ self._rotors.thrusts
         self._wind = Wind(sampled["wind"], keys[0]) if "wind" in sampled else None
         self._ground_effect = sampled.get("ground_effect", {}).get("strength", 0.0)
         self._sensors.begin(0, sampled, keys[1:])
         self._effects.begin(0, sampled)
-        self._k = 0
-        self._over = False
         self._pulled = 0.0
         self._read()
 
-    def _info(self, terms: dict[str, float], falls: Sequence[bool], events: Sequence[str]) -> dict[str, Any]:
-        """Return the `info`: data that policies must not use."""
-        return self._told.told(self._k * self.control_period, terms, events, falls)
-
-    def _simulate(self, command: list[float]) -> list[str]:
-        """Apply `command` and the disturbances for one control period; return the events."""
+    def _simulate(self, command: Array) -> list[str]:
         engine, events = self._engine, []
-        steps = self._ticks * STEPS
-        first = self._k * steps
-        thrusts = self._rotors.advance(command, first)
+        steps, first = self._substeps, self.elapsed
+        self._before = self._rotors.thrusts
+        thrusts = self._rotors.advance(command.tolist(), first)
         wrenches = thrusts @ robot.MIXER.T
         rows = wrenches.tolist()
-        quiet = self._schedule.quiet(first, first + steps)
+        quiet = self.schedule.quiet(first, first + steps)
         pulled = 0.0
         for start in range(0, steps, STEPS):
             end = start + STEPS
@@ -249,7 +163,7 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
             load = self._effects.load_of(self._state, (first + start) * TIME_STEP)
             for step in range(start, end):
                 if not quiet:
-                    events += self._schedule.apply(first + step, engine)
+                    events += self.schedule.apply(first + step, engine)
                 u1, u2, u3, u4 = rows[step]
                 engine.apply_base_wrench((drag_x, drag_y, drag_z + u1), (u2, u3, u4))
                 load_base(engine, load, 0)
@@ -280,7 +194,6 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
         return thrust_gain(heights, robot.ROTOR_RADIUS, self._ground_effect, np.maximum)
 
     def _measure(self) -> Array:
-        """Return the observation of the last state read."""
         state, rot = self._state, self._rot
         wx, wy, wz = state.angular_velocity
         rates = (rot[i] * wx + rot[3 + i] * wy + rot[6 + i] * wz for i in range(3))
@@ -299,12 +212,12 @@ class QuadInfinityPayloadEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any
     def _look(self, observation: Array) -> None:
         """Fill in what else is observed."""
 
-    def _reward_terms(self, before: Array) -> dict[str, float]:
+    def _reward_terms(self) -> dict[str, float]:
         plan = self._plan[self._k, :6].tolist()
         error = math.dist(plan[:3], self._state.position) ** 2
         velocity_error = math.dist(plan[3:], self._state.velocity) ** 2
         thrusts = self._rotors.thrusts
-        change = thrusts - before
+        change = thrusts - self._before
         effort, smoothness = float(thrusts.dot(thrusts)), float(change.dot(change))
         return task.reward_terms(error, velocity_error, self._rot[8], effort, smoothness, math.exp)
 

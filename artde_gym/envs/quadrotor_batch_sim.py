@@ -79,6 +79,7 @@ class QuadrotorBatchSim:
         self._keep, self._kick = np.zeros((4, n), dtype), np.zeros((4, n), dtype)
         self._windy = False
         self._ground_effect = np.zeros(n, dtype)
+        self._near_ground = False  # any vehicle with ground effect
         self._pushes = np.zeros((0, 3, n), dtype)  # forces that act (N, world axes)
         self._places = np.zeros((0, 3, n), dtype)  # points of application (m, body axes)
         self._at_load = np.zeros((0, n), np.bool_)  # which of them push the payload
@@ -86,6 +87,7 @@ class QuadrotorBatchSim:
         self.cables: Cables | None = None  # once a vehicle needs one
         self.pulled = np.zeros(n, dtype)
         self._effects = Effects(n, task.WORDS)
+        self._affected = False  # any vehicle by effects
 
     def begin(self, vehicles: NDArray[np.intp], sampled: Sequence[Mapping[str, Any]], keys: NDArray[np.uint64]) -> None:
         """Begin episodes of some vehicles in equilibrium, with sampled disturbances and the keys of their winds."""
@@ -110,7 +112,7 @@ class QuadrotorBatchSim:
             events.sort(key=lambda event: event.step)
             self._agenda[vehicle] = events[::-1]
             self._set_due(vehicle)
-        self._soonest = self._due.min()
+        self._soonest, self._affected = self._due.min(), bool(self._effects.acting.any())
 
     def _begin_air(self, vehicles: NDArray[np.intp], sampled: Sequence[Mapping[str, Any]]) -> None:
         winds = [own.get("wind") for own in sampled]
@@ -121,6 +123,7 @@ class QuadrotorBatchSim:
         self._wind[:, vehicles] = 0.0
         self._windy |= any(wind is not None for wind in winds)
         self._ground_effect[vehicles] = [own.get("ground_effect", {}).get("strength", 0.0) for own in sampled]
+        self._near_ground = bool(self._ground_effect.any())
 
     def _begin_payloads(
         self,
@@ -193,7 +196,9 @@ class QuadrotorBatchSim:
         goals = aims * self._left
         noise = self._noise() if self._windy else None
         total = np.zeros_like(self.thrusts)
-        self.pulled = np.zeros_like(self.pulled)
+        if self.cables is not None:
+            self.pulled = np.zeros_like(self.pulled)
+        constants = Air._make(self._air) if self._windy else None
         for step in range(self._steps):
             self._drift(GRID if step else 0.5 * GRID)
             if self._step >= self._soonest:
@@ -202,18 +207,18 @@ class QuadrotorBatchSim:
             self.thrusts, mean = follow(self.thrusts, goals, *self._shares)
             total += mean
             origin = bodies.origin()
-            wind = 0.0 if noise is None else self._wind_at(origin)
+            wind = 0.0 if constants is None else self._wind_at(origin, constants)
             u1, *torques = robot.wrench(*(mean * self._gains(origin[2])))
             force = bodies.rot[:, 2] * u1
             force += robot.DRAG * (wind - bodies.origin_velocity())
-            bodies.kick(GRID, *self._loaded(*self._pushed(force, np.stack(torques)), origin))
+            bodies.kick(GRID, *self._loaded(*self._pushed(force, np.array(torques)), origin))
             if self.cables is not None:
-                self._swing(self.cables)
+                self._swing(self.cables, constants)
             if noise is not None:
                 self._wind = advance(self._keep, self._kick, self._wind, noise[:, step])
             self._step += 1
         self._drift(0.5 * GRID)
-        self.wrenches = np.stack(robot.wrench(*(total / self._steps)))
+        self.wrenches = np.array(robot.wrench(*(total / self._steps)))
         return events
 
     def _drift(self, duration: float) -> None:
@@ -221,12 +226,13 @@ class QuadrotorBatchSim:
         if self.cables is not None:
             self.cables.drift(duration)
 
-    def _swing(self, cables: Cables) -> None:
-        """Let the loads swing through a step."""
+    def _swing(self, cables: Cables, constants: Air | None) -> None:
+        """Let the loads swing through a step, with the constants of the winds, if there are any."""
         force = np.zeros_like(cables.position)
         for push, at_load in zip(self._pushes, self._at_load, strict=True):
             np.add(force, push, out=force, where=at_load)
-        cables.kick(self.bodies, GRID, force, self._wind_at(cables.position) if self._windy else None)
+        wind = None if constants is None else self._wind_at(cables.position, constants)
+        cables.kick(self.bodies, GRID, force, wind)
         self.pulled += GRID * cables.tension
 
     def _begin_rotors(self, vehicles: NDArray[np.intp], sampled: Sequence[Mapping[str, Any]]) -> None:
@@ -244,7 +250,7 @@ class QuadrotorBatchSim:
 
     def _aims(self, commands: Array) -> Array:
         """Return the rotors' thrust targets (4, n) (N) for a control period that begins with these commands."""
-        aims = np.stack(robot.thrusts(*commands))
+        aims = np.array(robot.thrusts(*commands))
         np.clip(aims, 0.0, robot.MAX_THRUST, out=aims)
         if self._late is None:
             return aims
@@ -257,17 +263,17 @@ class QuadrotorBatchSim:
         index = (self._step - self._begun).astype(np.uint64) + np.arange(self._steps, dtype=np.uint64)[:, None]
         return uniform_noise(self._keys, index, self.thrusts.dtype)
 
-    def _wind_at(self, points: Array) -> Array:
+    def _wind_at(self, points: Array, constants: Air) -> Array:
         """Return the wind velocity at a point of each vehicle during this step (3, n) (m/s, world axes)."""
         (x, y, z), (ambient_x, ambient_y, ambient_z, turbulence) = points, self._wind
         states = ambient_x, ambient_y, ambient_z, turbulence
-        return np.stack(velocity(Air._make(self._air), states, (x, y, z), np.exp))
+        return np.array(velocity(constants, states, (x, y, z), np.exp))
 
     def _gains(self, height: Array) -> Array | float:
         """Return the gain of each rotor's thrust near the ground (4, n)."""
-        if not self._ground_effect.any():
+        if not self._near_ground:
             return 1.0
-        heights = np.stack(robot.rotor_heights(height, *self.bodies.rot[2, :2]))
+        heights = np.array(robot.rotor_heights(height, *self.bodies.rot[2, :2]))
         return thrust_gain(heights, robot.ROTOR_RADIUS, self._ground_effect, np.maximum)
 
     def _pushed(self, force: Array, torque: Array) -> tuple[Array, Array]:
@@ -281,7 +287,7 @@ class QuadrotorBatchSim:
 
     def _loaded(self, force: Array, torque: Array, origin: Array) -> tuple[Array, Array]:
         """Return force and torque with effects added."""
-        if self._effects.acting.any():
+        if self._affected:
             load = self._effects.load(self._states(origin))
             if load.force is not None:
                 force += load.force.T

@@ -65,11 +65,11 @@ class QuadSlingPayloadEnv(QuadInfinityPayloadEnv):
         told["cable_impulse"] = self._pulled
         return told
 
-    def _reward_terms(self, before: Array) -> dict[str, float]:
+    def _reward_terms(self) -> dict[str, float]:
         r, _ = self._sling.cable(self._state)
         error = self._load_error()
         steepness = -r[2] / max(math.hypot(*r), 1e-12) if self._sling.held else 1.0
-        return super()._reward_terms(before) | sling.load_terms(dot(error, error), steepness, math.exp)
+        return super()._reward_terms() | sling.load_terms(dot(error, error), steepness, math.exp)
 
     def _falls(self) -> tuple[bool, ...]:
         load = self._sling.payload_position() if self._sling.held else None

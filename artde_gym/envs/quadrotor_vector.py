@@ -10,11 +10,9 @@ from gymnasium.vector import AutoresetMode
 
 from artde_gym.arguments import known_arguments, steps_per_period
 from artde_gym.arrays import Array
-from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.noise import draw_keys
 from artde_gym.disturbances.wind import GRID
 from artde_gym.envs.documentation import filled
-from artde_gym.envs.options import warn_of_idle
 from artde_gym.envs.quadrotor_batch_sim import QuadrotorBatchSim
 from artde_gym.envs.quadrotor_sensors import Measurement, Sensors
 from artde_gym.envs.vector import BaseVectorEnv, Mask
@@ -98,7 +96,6 @@ class QuadInfinityPayloadVectorEnv(BaseVectorEnv):
             autoreset_mode=autoreset_mode,
             max_episode_steps=max_episode_steps,
         )
-        self._disturbances = task.parse(self.default_disturbances if disturbances is None else disturbances)
         steps = steps_per_period(control_period, GRID)
         self.control_period = steps * GRID
         self.measurement = measurement
@@ -106,18 +103,13 @@ class QuadInfinityPayloadVectorEnv(BaseVectorEnv):
         self._sensors = Sensors(num_envs, measurement, self.control_period, self.dtype, self.observation_layout)
         self.nominal_robot = robot.q450()
         self._plan = np.ascontiguousarray(task.plan(duration, self.control_period, self.lift).T, dtype=self.dtype)
-        last = self._plan.shape[1] - 1
-        self._last = min(last, self._limit or last)
-        warn_of_idle(self._disturbances, self._last * self.control_period)
+        self._set_episodes(self._plan.shape[1] - 1, disturbances)
         sizes = [min(FLEET, num_envs - first) for first in range(0, num_envs, FLEET)]
         self._fleets = [
             (slice(first, first + size), QuadrotorBatchSim(size, steps, self.dtype, self.lift))
             for first, size in zip(range(0, num_envs, FLEET), sizes, strict=True)
         ]
         self._before: list[Array] = []  # thrusts of each fleet one control period ago
-
-    def _parse(self, disturbances: Mapping[str, Any]) -> Disturbances:
-        return task.parse(disturbances)
 
     def _start(self, drawn: Mapping[int, Mapping[str, Any]]) -> None:
         keys = np.array([draw_keys(self._np_random[i], task.STREAMS) for i in drawn])
@@ -131,10 +123,10 @@ class QuadInfinityPayloadVectorEnv(BaseVectorEnv):
 
     def _advance(self, commands: Array, goes_on: Mask) -> dict[int, list[str]]:
         self._before = [fleet.thrusts for _, fleet in self._fleets]
-        waiting = ~goes_on & (self.autoreset_mode is AutoresetMode.DISABLED)
+        waits = self.autoreset_mode is AutoresetMode.DISABLED and not goes_on.all()
         events: dict[int, list[str]] = {}
         for part, fleet in self._fleets:
-            still = np.flatnonzero(waiting[part])
+            still = np.flatnonzero(~goes_on[part]) if waits else np.zeros(0, np.int64)
             motion = fleet.motion(still) if still.size else []
             told = fleet.advance(commands[part].T).items()
             if motion:

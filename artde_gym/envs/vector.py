@@ -18,11 +18,11 @@ from numpy.typing import ArrayLike, NDArray
 from artde_gym.arguments import check_seed, real_array
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
-from artde_gym.disturbances.numeric import Words, numeric_rows
+from artde_gym.disturbances.numeric import numeric_rows
 from artde_gym.disturbances.schedule import EVENTS
 from artde_gym.envs.closed_env import require_open
-from artde_gym.envs.options import disturbances_in, warn_of_idle
-from artde_gym.envs.step_limit import StepLimitMixin
+from artde_gym.envs.disturbed import DisturbedMixin
+from artde_gym.envs.options import disturbances_in, user_level
 from artde_gym.errors import ActionError, OptionError
 from artde_gym.info import FELL, REWARD, Columns, Mask, SampledTable, cleared, masked, prefixed
 from artde_gym.layout import Layout
@@ -32,7 +32,7 @@ from artde_gym.sim.factory import resolve_engine
 Order = Literal["C", "F"]
 
 
-class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
+class BaseVectorEnv(DisturbedMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], abc.ABC):
     """Many environments in one, each with its own random generator and independent of their number.
 
     A subclass defines the task; observations and actions are (n, size), in its memory `order`.
@@ -56,15 +56,11 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
     order: ClassVar[Order] = "C"
     action_layout: Layout
     observation_layout: Layout
-    robot_name: ClassVar[str]
     metrics_spec: MetricsSpec
     reward_scales: ClassVar[Mapping[str, float]]
     fall_reasons: ClassVar[Sequence[str]]
     allowed_action: ClassVar[str]
     own_engine: ClassVar[str]
-    control_period: float
-    words: Words
-    _disturbances: Disturbances
     _apart: Sequence[Disturbances] = ()  # of each environment, where they differ
     _np_random: Any  # a list with one entry per environment, as the seeds
     _np_random_seed: Any
@@ -99,13 +95,16 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
         seeded = [seeding.np_random() for _ in range(num_envs)]
         self._np_random, self._np_random_seed = map(list, zip(*seeded, strict=True))
         self._k = np.zeros(num_envs, np.int64)
+        self._all = np.ones(num_envs, np.bool_)
+        self._reason_names = [FELL + name for name in self.fall_reasons]
         self._over: Mask | None = None  # where an episode has ended; None before the first reset
         self._sampled: list[Mapping[str, Any]] = [{}] * num_envs
         self._table = SampledTable(num_envs)
 
-    @abc.abstractmethod
-    def _parse(self, disturbances: Mapping[str, Any]) -> Disturbances:
-        """Parse disturbances of this robot."""
+    def _set_episodes(self, last: int, disturbances: Mapping[str, Any] | None) -> None:
+        """Set the length of an episode (control periods), unless it is limited to fewer, and the disturbances."""
+        self._last = min(last, self._limit or last)
+        self._disturb(disturbances)
 
     @abc.abstractmethod
     def _start(self, drawn: Mapping[int, Mapping[str, Any]]) -> None:
@@ -208,7 +207,7 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
         truncated = (self._k >= self._last) & goes_on
         ended = terminated | truncated
         told = cleared(prefixed(REWARD, terms), over) | self._counts(events) | self._reasons(terminated, falls)
-        info = self._info(np.ones_like(over), told)
+        info = self._info(self._all, told)
         if self.autoreset_mode is AutoresetMode.NEXT_STEP:
             self._over = ended.copy()
         elif ended.any():
@@ -230,7 +229,7 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
                 warnings.warn(
                     f"{type(self).__name__} uses engine {self.own_engine!r}, but gym.make uses {default!r} by default: "
                     f"results will differ; pass engine={self.own_engine!r} to silence this warning",
-                    stacklevel=6,  # where gymnasium.make_vec was called
+                    stacklevel=user_level(),
                 )
         elif engine != self.own_engine:
             allowed = f"{self.own_engine!r}; for engine {engine!r}: gym.make_vec(..., vectorization_mode='sync')"
@@ -246,7 +245,7 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
             allowed = f"a mapping, or a list of {self.num_envs}, one for each environment"
             raise OptionError("disturbances", f"a list of {len(given)}", allowed)
         for one in self._apart or (self._disturbances,):
-            warn_of_idle(one, self._last * self.control_period)
+            self._warn_of_idle(one)
 
     def _renew(
         self, observations: Array, info: dict[str, Any], told: Columns, ended: Mask
@@ -256,7 +255,7 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
         self._begin(ended)
         renewed = self._truth()
         self._measure(renewed, ended)
-        begun = self._info(np.ones_like(ended), cleared(told, ended))
+        begun = self._info(self._all, cleared(told, ended))
         return renewed, begun | masked(final, ended.copy())
 
     def _commands(self, actions: ArrayLike) -> Array:
@@ -271,7 +270,7 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
         if not finite.all():
             i = int(np.flatnonzero(~finite.all(axis=1))[0])
             raise ActionError(f"action of environment {i}", commands[i].tolist(), f"finite {self.allowed_action}")
-        return np.clip(commands, self._low, self._high, out=commands)
+        return commands.clip(self._low, self._high, commands)
 
     def _mask(self, given: Any) -> Mask:
         if given is None:
@@ -327,10 +326,12 @@ class BaseVectorEnv(StepLimitMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
 
     def _reasons(self, terminated: Mask, falls: Sequence[Mask]) -> Columns:
         """Mark the first reason that holds where an episode was terminated."""
-        reasons: Columns = {}
+        reasons: Columns = dict(zip(self._reason_names, np.zeros((len(falls), self.num_envs), np.bool_), strict=True))
+        if not terminated.any():
+            return reasons
         left = terminated
-        for name, fell in zip(self.fall_reasons, falls, strict=True):
-            reasons[FELL + name] = fell & left
+        for name, fell in zip(self._reason_names, falls, strict=True):
+            reasons[name] = fell & left
             left = left & ~fell
         return reasons
 

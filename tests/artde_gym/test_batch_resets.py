@@ -8,6 +8,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.numeric import numeric, numeric_rows
 from artde_gym.robots.q450 import task
 from artde_gym.sim.rigid_bodies import MassProperties, composite
@@ -70,7 +71,7 @@ def test_bodies_are_combined_row_by_row() -> None:
 
 @pytest.mark.parametrize("case", CASES)
 def test_numbers_of_many_samples_are_those_of_each(case: dict[str, Any]) -> None:
-    disturbances = task.parse(case)
+    disturbances = Disturbances.parse(case, task.WORDS["site"], task.WORDS["joint"], "q450")
     samples = [disturbances.sample(np.random.default_rng(seed)) for seed in range(4)]
     rows = numeric_rows(samples, task.WORDS)
     for row, sampled in enumerate(samples):

@@ -120,9 +120,9 @@ def test_environments_that_walk_alike_share_a_plan_that_cannot_be_written() -> N
         for period in (0.001, 0.001, 0.002)
     ]
     first, second, slower = walks
-    plan = first._walk.plan
-    assert plan is second._walk.plan
-    assert np.array_equal(plan[::2], slower._walk.plan)
+    plan = first._task.plan
+    assert plan is second._task.plan
+    assert np.array_equal(plan[::2], slower._task.plan)
     with pytest.raises(ValueError, match="read-only"):
         plan[0] = 0.0
     observation, _ = first.reset(seed=0)

@@ -583,8 +583,8 @@ def test_a_delay_of_n_samples_is_n_samples(
     expected = np.tile(rest, (12, 1))
     expected[4 + samples, KNEE] += 1.5
     np.testing.assert_allclose(applied, expected, rtol=0, atol=1e-12)
-    acting = np.array(record.torques[-12 * env._walk.substeps :])  # what the engine really got
-    np.testing.assert_allclose(acting, np.repeat(expected, env._walk.substeps, axis=0), rtol=0, atol=1e-12)
+    acting = np.array(record.torques[-12 * env._task.substeps :])  # what the engine really got
+    np.testing.assert_allclose(acting, np.repeat(expected, env._task.substeps, axis=0), rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("constant", [0.0, 0.002, 0.02, 0.1])
@@ -603,7 +603,7 @@ def test_motors_lag_exponentially(constant: float, control_period: float, monkey
     expected = np.tile(rest, (20, 1))
     expected[:, KNEE] += share
     np.testing.assert_allclose(applied, expected, rtol=0, atol=1e-9)
-    acting = np.array(record.torques[-20 * env._walk.substeps :]).reshape(20, env._walk.substeps, 12).mean(axis=1)
+    acting = np.array(record.torques[-20 * env._task.substeps :]).reshape(20, env._task.substeps, 12).mean(axis=1)
     np.testing.assert_allclose(acting, expected, rtol=0, atol=1e-9)
 
 
@@ -645,10 +645,10 @@ def test_a_lost_actuator_gives_its_share_from_its_start(
     env.reset(seed=0)
     record, count = Recorder(env, monkeypatch), 30
     rest, applied = probe(env, np.zeros(count))
-    expected = np.tile(rest, (count * env._walk.substeps, 1))
+    expected = np.tile(rest, (count * env._task.substeps, 1))
     expected[round(start / DT) :, KNEE] *= 0.3
     np.testing.assert_allclose(record.torques[-len(expected) :], expected, rtol=1e-12)
-    mean = expected.reshape(count, env._walk.substeps, 12).mean(axis=1)
+    mean = expected.reshape(count, env._task.substeps, 12).mean(axis=1)
     np.testing.assert_allclose(applied, mean, rtol=1e-12)
 
 

@@ -64,6 +64,7 @@ def test_a_model_of_stable_baselines_is_known_by_its_parameters(algorithm, tmp_p
     assert run(model, tmp_path / "run") == 1
     assert identified_by(tmp_path / "run") == "parameters"
     assert run(kind.load(tmp_path / "model.zip", device="cpu"), tmp_path / "run") == 0  # as another process has it
+    model.set_logger(learning.common.logger.Logger(None, []))  # the default one makes a folder
     model.learn(16)
     with pytest.raises(StoreError, match="different: controllers"):
         run(model, tmp_path / "run")

@@ -93,9 +93,9 @@ def test_links_of_another_mass(engine: Engine) -> None:
 def test_the_distribution_of_mass_keeps_the_weight(engine_name: EngineName, legs: float, arms: str) -> None:
     env = make({"mass_distribution": legs}, engine=engine_name, arms=arms)
     env.reset(seed=0)
-    factors = env._walk._mass_factors(env.sampled_disturbances)
+    factors = env._task._mass_factors(env.sampled_disturbances)
     assert {factor for name, factor in factors.items() if name in env.nominal_robot.actuated} == {legs}
-    assert sum(factors[link.name] * link.mass for link in env._walk.robot.links) == pytest.approx(TOTAL_MASS)
+    assert sum(factors[link.name] * link.mass for link in env._task.robot.links) == pytest.approx(TOTAL_MASS)
     policy, state, (observation, _) = controllers.make("tde", env), None, env.reset(seed=0)
     loads = []
     for _ in range(300):

@@ -306,7 +306,7 @@ def test_a_site_that_is_not_there_cannot_be_pushed():
 
 
 def test_an_environment_that_tells_no_pose_is_refused(monkeypatch):
-    monkeypatch.delattr("artde_gym.envs.interactive.InteractiveMixin.pose")
+    monkeypatch.delattr("artde_gym.envs.engine_env.EngineEnv.pose")
     with pytest.raises(OptionError, match="pose"):
         Player(Cell("custom", "QuadInfinity-Payload-v0", dict(FLIGHT)), "x", Broken(), {})
 

@@ -3,6 +3,7 @@
 `make clients` installs the libraries and runs these tests; `pytest -m clients` runs those whose library is installed.
 """
 
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if "clients" not in config.option.markexpr:
         items[:] = [item for item in items if item not in own]
         config.hook.pytest_deselected(items=own)
+
+
+@pytest.fixture(autouse=True)
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the default loggers of learning libraries make their folders where pytest removes them."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
 
 
 @pytest.fixture(params=ours())

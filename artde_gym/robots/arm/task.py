@@ -7,7 +7,7 @@ import functools
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.friction import KIND as FRICTION
 from artde_gym.disturbances.friction import check_friction
-from artde_gym.disturbances.numeric import Words
 from artde_gym.errors import DisturbanceError, OptionError
 from artde_gym.layout import Field, Layout
 from artde_gym.metrics_spec import EffortSignal, Fields, MetricsSpec, TrackedSignal
@@ -28,7 +27,8 @@ from artde_gym.robots.arm.panda import panda
 from artde_gym.robots.arm.reader import read_arm
 from artde_gym.robots.arm.reference import reference
 from artde_gym.robots.arm.tool import Tool
-from artde_gym.robots.arm.workspace import TIME_STEP, smallest_inertia
+from artde_gym.robots.arm.workspace import smallest_inertia
+from artde_gym.robots.joint_task import TIME_STEP, JointTask
 from artde_gym.sim.engine import World
 
 MAX_SPEED = 200.0  # rad/s or m/s, bound of observed joint speeds; of joints without a limit of their own the fastest
@@ -160,25 +160,18 @@ def metrics_spec(spec: RobotSpec) -> MetricsSpec:
 
 
 @dataclasses.dataclass(frozen=True)
-class Tracking:
-    """Everything that is the same in all episodes of an environment.
+class Tracking(JointTask):
+    """An arm that follows a reference.
 
     Attributes:
-        nominal_robot: the arm, known to controllers.
-        substeps: physics steps per control period.
-        plan: references in the observation, one row per control period: (samples, 3 n), and (samples, 3) of the tool.
+        tool: reference of the tool in the observation, one row per control period: (samples, 3).
         damping, coulomb, slip: joint friction (n,).
-        arguments: arguments of `of`.
     """
 
-    nominal_robot: RobotSpec
-    substeps: int
-    plan: Array
     tool: Array
     damping: Array
     coulomb: Array
     slip: Array
-    arguments: tuple[Any, ...]
 
     @classmethod
     def of(
@@ -190,7 +183,7 @@ class Tracking:
         given: Any,
         control_period: float,
         duration: float,
-    ) -> Tracking:
+    ) -> Self:
         """Build it from the arguments of an environment.
 
         Raises:
@@ -204,43 +197,12 @@ class Tracking:
         last = max(1, round(seconds / period))
         found = reference(spec, given, period * np.arange(last + 1))
         plan = np.concatenate(found, axis=1)
-        friction = _friction(spec)
         arguments = (robot, tip, armature, joints, given, control_period, duration)
-        return cls(spec, substeps, plan, Tool(spec).position(found.q), *friction, arguments)
-
-    def __deepcopy__(self, _: dict[int, Any]) -> Tracking:
-        return self  # immutable
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Tracking.of, self.arguments
-
-    @property
-    def n(self) -> int:
-        """Number of joints."""
-        return len(self.nominal_robot.actuated)
-
-    @property
-    def start(self) -> Array:
-        """Joint positions (n,) at the start."""
-        return self.plan[0, : self.n]
-
-    @property
-    def control_period(self) -> float:
-        return self.substeps * TIME_STEP
-
-    @property
-    def last(self) -> int:
-        """Index of the last control period."""
-        return len(self.plan) - 1
-
-    @property
-    def words(self) -> Words:
-        """Names of sites and joints."""
-        return {"site": tuple(name for name, _, _ in self.nominal_robot.sites), "joint": self.nominal_robot.actuated}
+        tool = Tool(spec).position(found.q)
+        return cls(spec, spec, substeps, plan, arguments, tool, *_friction(spec))
 
     def parse(self, disturbances: Mapping[str, Any]) -> Disturbances:
-        """Parse disturbances of this arm."""
-        parsed = Disturbances.parse(disturbances, self.words["site"], self.words["joint"], self.nominal_robot.name)
+        parsed = super().parse(disturbances)
         check_friction(parsed.entries, float(smallest_inertia(self.nominal_robot).min()), TIME_STEP)
         for kind, entry in parsed.entries:
             if kind == "sensor_noise" and (entry["tilt"] != 0 or entry["angular_velocity"] != 0):
@@ -251,8 +213,7 @@ class Tracking:
         """Apply sampled disturbances to a world, except the payload."""
         world.scale_masses(sampled.get("mass_scale", {}).get("factor", 1.0))
 
-    def at_tool(self, sampled: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return the disturbances with the payload's position in the frame of the link that carries it."""
+    def placed(self, sampled: Mapping[str, Any]) -> Mapping[str, Any]:
         if "payload" not in sampled:
             return sampled
         payload = sampled["payload"]
@@ -264,18 +225,11 @@ class Tracking:
         """Position of the tool in the frame of the link that carries it (m)."""
         return next(point for name, _, point in self.nominal_robot.sites if name == TOOL)
 
-    def pose(self, sampled: Mapping[str, Any]) -> Array:
-        """Return joint positions (n,) at the start."""
-        pose = self.start.copy()
-        for entry in sampled.get("initial_pose", ()):
-            pose[self.nominal_robot.actuated.index(entry["joint"])] += entry["offset"]
-        return pose
-
     def balance(self, sampled: Mapping[str, Any]) -> Array:
         """Return torques (n,) that hold the arm at the start, within their limits."""
         tree, q = RigidBodyTree(self.nominal_robot), self.pose(sampled)
         tau = sampled.get("mass_scale", {}).get("factor", 1.0) * tree.joint_torques(q, 0 * q, 0 * q)
-        payload = self.at_tool(sampled).get("payload")
+        payload = self.placed(sampled).get("payload")
         if payload is not None and payload["attach_time"] == 0 and payload["detach_time"] > 0:
             link = self.nominal_robot.payload_link
             jacobian = tree.jacobian(link, q)[:, 6:]

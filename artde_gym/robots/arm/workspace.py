@@ -12,7 +12,6 @@ from artde_gym.multibody.dynamics import RigidBodyTree
 from artde_gym.multibody.spec import RobotSpec
 
 POSES, SEED = 500, 0
-TIME_STEP = 0.001  # s, of the physics
 
 
 @functools.lru_cache(maxsize=8)

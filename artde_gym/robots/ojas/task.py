@@ -6,7 +6,7 @@ import dataclasses
 import math
 import weakref
 from collections.abc import Callable, Mapping
-from typing import Any, Literal, TypeVar, get_args
+from typing import Any, Literal, Self, TypeVar, get_args
 
 import numpy as np
 
@@ -16,13 +16,13 @@ from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.friction import KIND as JOINT_FRICTION
 from artde_gym.disturbances.friction import check_friction
 from artde_gym.disturbances.ground import GrfPulses
-from artde_gym.disturbances.numeric import Words
 from artde_gym.errors import DisturbanceError
 from artde_gym.layout import Field, Layout
 from artde_gym.metrics_spec import EffortSignal, MetricsSpec, TrackedSignal
 from artde_gym.multibody.dynamics import GRAVITY, RigidBodyTree, joint_space_inertia
-from artde_gym.multibody.spec import RobotSpec, Vector
+from artde_gym.multibody.spec import Vector
 from artde_gym.multibody.support import Supported
+from artde_gym.robots.joint_task import TIME_STEP, JointTask
 from artde_gym.robots.ojas import model as robot
 from artde_gym.robots.ojas.model import ActuatorInertia, ojas
 from artde_gym.robots.ojas.walking import WalkingPattern, hip_height_above_ankle, walking_pattern
@@ -30,7 +30,6 @@ from artde_gym.sim.engine import World
 
 Arms = Literal["fixed", "revolute"]
 
-TIME_STEP = 0.001  # s, of the physics
 FRICTION = 0.8  # coefficient between feet and ground
 FALL_TILT_DEG = 35.0
 FALL_HEIGHT = 0.25  # m, of the base; while walking, the hips are at 0.395 m or higher
@@ -148,31 +147,20 @@ with a norm above 200 rad/s (`fell_speed`: the motion has diverged). *Truncated*
 
 
 @dataclasses.dataclass(frozen=True)
-class Walk:
-    """Everything that is the same in all episodes of an environment.
+class Walk(JointTask):
+    """A walk of Ojas; all environments of a process that walk alike share its read-only `plan`, (samples, 38).
 
     Attributes:
-        nominal_robot: model known to controllers.
-        robot: simulated model.
         pattern: walking pattern.
-        substeps: physics steps per control period.
-        plan: references in the observation, one row per control period: (samples, 38); read-only, and shared by all
-            environments of a process that walk alike.
         position: position of the base at the start (m), with the robot upright.
         stand: joint torques (12,) (Nm) that balance the pattern's first pose.
         damping: damping of the joints while the robot settles (Nm s/rad).
-        arguments: arguments of `of`.
     """
 
-    nominal_robot: RobotSpec
-    robot: RobotSpec
     pattern: WalkingPattern
-    substeps: int
-    plan: Array
     position: Vector
     stand: Array
     damping: float
-    arguments: tuple[Any, ...]
 
     @classmethod
     def of(
@@ -184,7 +172,7 @@ class Walk:
         speed: float,
         step_duration: float,
         duration: float,
-    ) -> Walk:
+    ) -> Self:
         """Build it from the arguments of an environment.
 
         Raises:
@@ -204,36 +192,10 @@ class Walk:
         damping = BARE_DAMPING if actuator_inertia == "none" else SETTLE_DAMPING
         place = (float(pattern.base[0, 0]), 0.0, hip_height)
         arguments = (control_period, actuator_inertia, arms, self_collision, speed, step_duration, duration)
-        return cls(nominal, model, pattern, substeps, plan, place, stand, damping, arguments)
-
-    def __deepcopy__(self, _: dict[int, Any]) -> Walk:
-        return self  # immutable
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Walk.of, self.arguments  # a thousandth of the data
-
-    @property
-    def start(self) -> Array:
-        """Joint angles (12,) (rad) at the start."""
-        return self.pattern.q[0]
-
-    @property
-    def control_period(self) -> float:
-        return self.substeps * TIME_STEP
-
-    @property
-    def last(self) -> int:
-        """Index of the walk's last control period."""
-        return len(self.plan) - 1
-
-    @property
-    def words(self) -> Words:
-        """Names of sites and joints."""
-        return {"site": tuple(name for name, _, _ in self.robot.sites), "joint": self.nominal_robot.actuated}
+        return cls(nominal, model, substeps, plan, arguments, pattern, place, stand, damping)
 
     def parse(self, disturbances: Mapping[str, Any]) -> Disturbances:
-        """Parse disturbances of this robot."""
-        parsed = Disturbances.parse(disturbances, self.words["site"], self.words["joint"], self.nominal_robot.name)
+        parsed = super().parse(disturbances)
         if not any(self.nominal_robot.armature) and any(kind == "rotor_inertia" for kind, _ in parsed.entries):
             problem = "needs rotors, which discs and bare links have not"
             raise DisturbanceError("disturbances", "rotor_inertia", "choose actuator_inertia='rotor'", problem)
@@ -264,13 +226,6 @@ class Walk:
     def pulses(self, n: int) -> GrfPulses:
         """Return the ground reaction pulses of `n` robots on this walk."""
         return GrfPulses(n, self.pattern.load_left, TIME_STEP)
-
-    def pose(self, sampled: Mapping[str, Any]) -> Array:
-        """Return joint angles (12,) (rad) in which the robot settles."""
-        pose = self.start.copy()
-        for entry in sampled.get("initial_pose", ()):
-            pose[self.nominal_robot.actuated.index(entry["joint"])] += entry["offset"]
-        return pose
 
     def hold(self, pose: Array, q: Array, qd: Array) -> Array:
         """Return torques (..., 12) (Nm) of joint springs with which the robot settles in a pose.

@@ -10,7 +10,6 @@ from typing import Any, TypeVar
 import numpy as np
 
 from artde_gym.arrays import Array
-from artde_gym.disturbances import Disturbances
 from artde_gym.disturbances.ground_effect import thrust_gain
 from artde_gym.disturbances.numeric import Words
 from artde_gym.disturbances.wind import GRID
@@ -233,11 +232,6 @@ def falls(position: Vector3[Number], up: Number, spin: Number) -> tuple[Any, Any
     x, y, z = position
     inside = (abs(x) <= FLIGHT_BOUND) & (abs(y) <= FLIGHT_BOUND) & (z <= FLIGHT_BOUND) & (spin <= MAX_SPIN**2)
     return z < GROUND_HEIGHT, up < 0.0, inside ^ True
-
-
-def parse(disturbances: Mapping[str, Any]) -> Disturbances:
-    """Parse disturbances of the Q450."""
-    return Disturbances.parse(disturbances, WORDS["site"], WORDS["joint"], robot.q450().name)
 
 
 def plan(duration: float, period: float, lift: float = 0.0) -> Array:

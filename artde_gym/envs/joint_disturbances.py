@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -12,20 +12,8 @@ from artde_gym.disturbances.actuation import Actuation
 from artde_gym.disturbances.schedule import Schedule
 from artde_gym.disturbances.sensing import Sensing
 from artde_gym.layout import Layout
-from artde_gym.multibody.spec import RobotSpec
-from artde_gym.robots.ojas.task import OBSERVATION, TIME_STEP
+from artde_gym.robots.joint_task import TIME_STEP, JointTask
 from artde_gym.sim.engine import World
-
-
-class Task(Protocol):
-    """The part of a task that disturbances need."""
-
-    @property
-    def nominal_robot(self) -> RobotSpec: ...
-    @property
-    def substeps(self) -> int: ...
-    @property
-    def control_period(self) -> float: ...
 
 
 class EpisodeDisturbances:
@@ -35,7 +23,7 @@ class EpisodeDisturbances:
 
     Args:
         sampled: sampled disturbances.
-        walk: the disturbed walk, or another task.
+        task: the disturbed task.
         rng: generator of the environment.
         layout: layout of the observation.
 
@@ -44,16 +32,14 @@ class EpisodeDisturbances:
         sensing: disturbances of the observations; None without any.
     """
 
-    def __init__(
-        self, sampled: Mapping[str, Any], walk: Task, rng: np.random.Generator, layout: Layout = OBSERVATION
-    ) -> None:
+    def __init__(self, sampled: Mapping[str, Any], task: JointTask, rng: np.random.Generator, layout: Layout) -> None:
         kinds = sampled.keys()
         self.schedule = Schedule(sampled, TIME_STEP)
-        joints = walk.nominal_robot.actuated
+        joints = task.nominal_robot.actuated
         self._actuation = None if kinds.isdisjoint(Actuation.KINDS) else Actuation(sampled, joints, TIME_STEP)
-        self.sensing = None if kinds.isdisjoint(Sensing.KINDS) else Sensing(sampled, layout, walk.control_period, rng)
+        self.sensing = None if kinds.isdisjoint(Sensing.KINDS) else Sensing(sampled, layout, task.control_period, rng)
         self._target = self._total = np.zeros(len(joints))
-        self._substeps = walk.substeps
+        self._substeps = task.substeps
 
     def start(self, world: World) -> None:
         """Apply the disturbances that act while the robot settles."""
