@@ -276,6 +276,16 @@ def test_a_hostile_name_is_text(solid_browser, tmp_path):
     assert solid_browser.run(f"{REPLAY}.runs[0].tag.textContent") == name
 
 
+def test_black_shows_in_the_dark(solid_browser, tmp_path):
+    page = artde_gym.replay(
+        {"computed-torque": "tde"}, "QuadInfinity-Payload-v0", env_kwargs={"duration": 0.1}, disturbances={}
+    )
+    assert page.figures[0]["episodes"][0]["runs"][0]["color"] == "#000000"
+    shown(solid_browser, page.save(tmp_path / "x.html"), dark=True)
+    key = f"getComputedStyle({SHOWN}.querySelector('.tag i')).backgroundColor.match(/[0-9]+/g).map(Number)"
+    assert min(solid_browser.run(key)) > 100
+
+
 def test_without_webgl_a_sentence_events_and_charts(browser, walk):
     shown(browser, walk)
     assert "no WebGL" in browser.run(f"{SHOWN}.querySelector('.failed').textContent")
