@@ -4,6 +4,7 @@ from __future__ import annotations
 
 SHOWN = {
     "walk": "A walk with a payload under TDE, ARTDE and a stiffer TDE",
+    "switched": "A walk with a payload under TDE with and without gains for each phase of support",
     "push": "A push on the chest under TDE, ATDE and ARTDE",
     "flight": "A flight in strong wind under TDE and ARTDE",
     "rivals": "A flight in strong wind under PID, INDI, ASMC and geometric control",
