@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import signal
 import socket
 import sys
+import threading
 import webbrowser
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -68,11 +72,35 @@ def play(
     server = Server(host, port)
     try:
         _announce(server, browser)
-        run(Game(plan), server)
+        game = Game(plan)
+        with _until_interrupted() as going:
+            run(game, server, going)
     except KeyboardInterrupt:
         pass
     finally:
         server.close()
+
+
+@contextlib.contextmanager
+def _until_interrupted() -> Iterator[Callable[[], bool]]:
+    """Let the first Ctrl-C end a loop between two rounds, and a second one at once.
+
+    In the midst of a round it could leave a lock that threads of browsers wait for, and the command would not end.
+    """
+    ended = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield lambda: True  # signals are not told here
+        return
+
+    def end(*_: object) -> None:
+        ended.set()
+        signal.signal(signal.SIGINT, before)
+
+    before = signal.signal(signal.SIGINT, end)
+    try:
+        yield lambda: not ended.is_set()
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _announce(server: Server, browser: bool) -> None:

@@ -79,7 +79,7 @@ def single_arguments(env_id: str, kwargs: Mapping[str, Any]) -> dict[str, Any]:
     try:
         return with_engine(env_id, kwargs)
     except OptionError:  # the vector's own physics
-        return {name: value for name, value in kwargs.items() if name != "engine"}
+        return with_engine(env_id, {name: value for name, value in kwargs.items() if name != "engine"})
 
 
 def fastest_engine(env_id: str, engine: str | None = None) -> tuple[bool, str]:
@@ -97,8 +97,8 @@ def fastest_engine(env_id: str, engine: str | None = None) -> tuple[bool, str]:
 
 def physics_of(kwargs: Mapping[str, Any]) -> str:
     """Return the title of the physics for arguments from `with_engine`."""
-    name = kwargs.get("engine", "NumPy")
-    return ENGINES[name].title if name in ENGINES else str(name)
+    name = kwargs.get("engine", "numpy")
+    return ENGINES[name].title if name in ENGINES else {"numpy": "NumPy"}.get(name, str(name))
 
 
 def ours() -> list[str]:

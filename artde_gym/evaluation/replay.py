@@ -11,12 +11,12 @@ from artde_gym.arguments import check_integer, wrap_read_errors
 from artde_gym.deprecation import current_configuration
 from artde_gym.errors import OptionError, StoreError, UnknownNameError, suggest_names
 from artde_gym.evaluation.cells import Cell
-from artde_gym.evaluation.environments import metrics_spec_of, robot_of, single_arguments
+from artde_gym.evaluation.environments import metrics_spec_of, physics_of, robot_of, single_arguments
 from artde_gym.evaluation.plan import Plan
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.evaluation.store import RECORD, read_episodes
-from artde_gym.evaluation.takes import Take, has_motion, new_take, stored_take, text_of
+from artde_gym.evaluation.takes import Take, compared, has_motion, new_take, stored_take, text_of
 from artde_gym.motion.replay import Replay
 from artde_gym.motion.scene import scene_of
 from artde_gym.palette import styles
@@ -217,7 +217,8 @@ class _Archive:
             problem = "has no motion in the folder, and no registered name by which it could be run again"
             raise UnknownNameError("controller", name, f"registered are {suggest_names(name, known)}", problem)
         gains = self._configuration.get("gains", {}).get(name, {})
-        return new_take(cell, name, known[name], gains, int(row["seed"]), row, _told(on_progress, name))
+        take = new_take(cell, name, known[name], gains, int(row["seed"]), _told(on_progress, name))
+        return compared(take, row, physics_of(cell.kwargs), physics_of(self._cells[cell.name].kwargs))
 
 
 def _chosen(rows: Rows, controllers: Sequence[str] | None) -> list[str]:

@@ -13,6 +13,7 @@ from artde_gym.arrays import Array
 from artde_gym.disturbances.schedule import force_of
 from artde_gym.errors import OptionError
 from artde_gym.evaluation.cells import Cell, single_of
+from artde_gym.evaluation.environments import metrics_spec_of
 from artde_gym.evaluation.gains import policy_for
 from artde_gym.evaluation.metrics import NEVER
 from artde_gym.evaluation.rollout import Policy, nested, run_episode
@@ -25,6 +26,7 @@ from artde_gym.registration import ControllerSpec
 POINTS = 400  # at most, of a plotted signal
 LEVELS = 2000  # of a plotted signal, from zero to its largest value
 INSIDE = "policy."
+SAME = 1e-6  # share of a number, by which it may differ in the same episode
 SYMBOLS = {"n": "N", "nm": "Nm"}
 """Unit as columns spell it -> as it is written, where they differ."""
 
@@ -84,32 +86,45 @@ def new_take(
     item: Policy | ControllerSpec,
     gains: Mapping[str, Any],
     seed: int,
-    row: Mapping[str, Any] | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> Take:
-    """Run an episode; where it is not that of a stored `row` again, its note says so.
+    """Run an episode.
 
     Raises:
         OptionError, DisturbanceError, GainError: for what an environment or a controller refuses.
     """
     env, options = single_of(cell)
     episode = run_episode(env, policy_for(item, env, dict(gains)), seed, options=options, on_progress=on_progress)
-    own = {"env": cell.env_id, **episode.row}
-    return Take(name, own, episode.traces, "" if row is None else _difference(name, own, row))
+    return Take(name, {"env": cell.env_id, **episode.row}, episode.traces)
 
 
-def _difference(name: str, own: Mapping[str, Any], row: Mapping[str, Any]) -> str:
-    ends = [_end(one) for one in (own, row)]
-    if ends[0] == ends[1] and math.isclose(own["duration_s"], row["duration_s"], abs_tol=1e-6):
-        return ""
-    return (
-        f"{name} was run again and did not repeat: it {ends[0]}, while in episodes.csv it {ends[1]} "
-        "(another machine or engine, or other versions?)"
-    )
+def compared(take: Take, row: Mapping[str, Any], now: str, then: str) -> Take:
+    """Return a take that was run again with a note, if it is not the episode of a stored `row`.
+
+    Args:
+        take: the episode as it is now.
+        row: of the table of episodes.
+        now, then: titles of the physics of both.
+    """
+    same = all(math.isclose(take.row[key], row[key], rel_tol=SAME, abs_tol=SAME) for key in _compared(take, row))
+    if same and take.row["fell"] == row["fell"]:
+        return take
+    why = "another machine or other versions?" if now == then else f"it ran in {then}, and again in {now}"
+    note = f"it {_end(take, take.row)}, while in episodes.csv it {_end(take, row)} ({why})"
+    return take._replace(note=f"{take.name} was run again and did not repeat: {note}")
 
 
-def _end(row: Mapping[str, Any]) -> str:
-    return f"{'fell' if row['fell'] else 'ended'} at {row['duration_s']:.3f} s"
+def _compared(take: Take, row: Mapping[str, Any]) -> list[str]:
+    """Return the columns that show whether an episode is the same: its duration, and its main error if it is known."""
+    error = metrics_spec_of(take.row["env"]).errors[0]
+    metric = f"rmse_{error.unit}"
+    return ["duration_s", *([metric] if math.isfinite(row.get(metric, math.nan)) else [])]
+
+
+def _end(take: Take, row: Mapping[str, Any]) -> str:
+    _, *errors = _compared(take, row)
+    error = "".join(f" with {name} {row[name]:.6g}" for name in errors)
+    return f"{'fell' if row['fell'] else 'ended'} at {row['duration_s']:.3f} s{error}"
 
 
 def text_of(take: Take, tracking: MetricsSpec, color: str) -> dict[str, Any]:

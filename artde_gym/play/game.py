@@ -22,6 +22,7 @@ from artde_gym.registration import registered_controllers
 TOGETHER = 2  # controllers at most
 PUSH_DURATION = 0.2  # s, of a push by key or button
 PULL_DURATION = 0.05  # s, for which the force of a drag stays the same
+PULL_LASTS = 1.0  # s of real time, after which a drag ends that no browser tells any more
 PAYLOAD_SHARE = 0.15  # mass of a payload over the robot's, where none was given
 SPEED_RANGE = (1 / 64, 4.0)  # slowest and fastest, simulated over real time
 LARGEST_SEED = 2**31 - 1
@@ -83,6 +84,9 @@ class Game:
         """Simulate so many seconds of real time; rounding to control periods does not accumulate."""
         if self.paused or self.over:
             return
+        self._held -= seconds
+        if self._held < _EPS:
+            self._pull = None
         self._wanted += seconds * self.speed
         while self.time < self._wanted - _EPS and not self.over:
             self._step()
@@ -119,7 +123,7 @@ class Game:
             player.reset(episode_seed(self.seed, 0), begun)
         self._steps, self.time, self._wanted = 0, 0.0, 0.0
         self._pull: tuple[str, tuple[float, ...]] | None = None
-        self._pulled = 0.0  # s, until when the force of a drag acts
+        self._pulled, self._held = 0.0, 0.0  # s, until when the force of a drag acts, and for how long it is held
         self.record = Record(begun)
         sampled = self.players[0].plant.sampled_disturbances
         self.scheduled = [push_text(entry) for entry in sampled.get("push", ())]
@@ -202,7 +206,7 @@ class Game:
             return
         x, y, z = (round(part, 1) for part in _force(order["force"]))
         site = self._site(order)
-        self._pull = (site, (x, y, z)) if (x, y, z) != (0.0, 0.0, 0.0) else None
+        self._pull, self._held = (site, (x, y, z)) if (x, y, z) != (0.0, 0.0, 0.0) else None, PULL_LASTS
 
     def _drop(self, order: Mapping[str, Any]) -> None:
         self._require("drop")

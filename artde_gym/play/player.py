@@ -55,9 +55,17 @@ class Player:
 
     def _take(self, name: str, item: Policy | ControllerSpec, gains: dict[str, Any]) -> None:
         """Change the controller; what is refused changes nothing."""
-        policy = policy_for(item, self._env, gains)
+        policy = self._built(name, item, gains)
         self.policy, self.name, self.item, self.gains = policy, name, item, gains
         self.ranges = _ranges(item, self._env)
+
+    def _built(self, name: str, item: Policy | ControllerSpec, gains: dict[str, Any]) -> Policy:
+        try:
+            return policy_for(item, self._env, gains)
+        except ArtdeGymError:
+            raise
+        except Exception as error:  # of somebody's own controller
+            raise OptionError("controller", name, _text(error), "cannot be built") from error
 
     def reset(self, seed: int, disturbances: Mapping[str, Any]) -> None:
         """Begin an episode.
@@ -77,6 +85,10 @@ class Player:
             action, state = self.policy.predict(
                 self._observation, state=self._state, episode_start=self._first, deterministic=True
             )
+        except Exception as error:  # of somebody's own controller
+            self.over, self.fault = True, _text(error)
+            return
+        try:
             self._observation, _, terminated, truncated, info = self._env.step(action)
         except ArtdeGymError as error:
             self.over, self.fault = True, str(error)
@@ -131,6 +143,10 @@ class Player:
             }
         found = {label: float(values[0]) for label, values in signals_of(fields, self._metrics)}
         return [found.get(label, float("nan")) for label in self.labels]
+
+
+def _text(error: Exception) -> str:
+    return str(error) if isinstance(error, ArtdeGymError) else f"{type(error).__name__}: {error}"
 
 
 def _labels(metrics: MetricsSpec) -> list[str]:

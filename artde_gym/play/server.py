@@ -57,13 +57,13 @@ class _Slot:
     def put(self, news: News) -> None:
         with self._changed:
             self._news = news
-            self._changed.notify()
+            self._changed.notify_all()
 
     def end(self) -> None:
         """Let `get` return None from now on."""
         with self._changed:
             self._ended = True
-            self._changed.notify()
+            self._changed.notify_all()
 
     def get(self, known: News) -> News | None:
         """Wait for news other than those known, and return them; None at the end."""

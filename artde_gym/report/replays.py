@@ -38,7 +38,11 @@ def _shown(run: Run, scenario: str) -> list[str]:
     places = {name: run.place(scenario, name) for name in names}
     ranks = worst_median_best(with_motion(ranked(cell, rows, names), scenario, places))
     if not ranks:
-        told = "No motion was stored for this scenario; `artde-gym replay` runs its episodes again to show them."
+        told = (
+            "No motion was stored for this scenario, as by vectorized evaluations and by older releases. "
+            f"`artde-gym replay FOLDER --scenario {scenario}`, with this folder, runs an episode again from its seed "
+            "to show it, and says if it does not repeat."
+        )
         return [paragraph(told, "soft")]
 
     def takes(number: int) -> list[Take]:

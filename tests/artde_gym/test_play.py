@@ -15,7 +15,7 @@ from artde_gym.errors import OptionError, RobotError
 from artde_gym.evaluation import evaluate
 from artde_gym.evaluation.cells import Cell
 from artde_gym.evaluation.plan import Plan
-from artde_gym.play.game import ORDERS, Game
+from artde_gym.play.game import ORDERS, PULL_LASTS, Game
 from artde_gym.play.loop import RATE, run
 from artde_gym.play.player import Player
 from artde_gym.play.record import MOST_PUSHES, Record, push_entry
@@ -158,6 +158,14 @@ def test_a_drag_is_one_push_for_the_page_and_ends_when_it_is_let_go():
     assert shown["end"] < game.time - 0.3
 
 
+def test_a_drag_ends_when_its_browser_is_gone():
+    game = flying(given={})
+    order(game, do="pull", site="body", force=[1.0, 0.0, 0.0])
+    turns(game, 2.0)
+    (push,) = game.record.disturbances()["push"]
+    assert push["duration"] == pytest.approx(PULL_LASTS, abs=0.1)
+
+
 def test_gains_and_controllers_change_while_it_runs():
     game, other = flying(), flying()
     for one in (game, other):
@@ -285,13 +293,38 @@ class Broken:
         return np.full(4, np.nan), None
 
 
-def test_a_controller_that_fails_ends_its_own_episode():
-    game = flying({"mine": Broken(), "tde": "tde"})
+class Unsound(Broken):
+    """Somebody's own code, with an error of its own."""
+
+    def predict(self, *args: Any, **kwargs: Any) -> Any:
+        raise ZeroDivisionError("division by zero")
+
+
+@pytest.mark.parametrize(
+    ("policy", "fault"), [(Broken(), "finite"), (Unsound(), "ZeroDivisionError: division by zero")]
+)
+def test_a_controller_that_fails_ends_its_own_episode(policy, fault):
+    game = flying({"mine": policy, "tde": "tde"})
     turns(game, 0.5)
     mine, tde = told(game)["players"]
-    assert "finite" in mine["fault"]
+    assert fault in mine["fault"]
     assert (mine["over"], mine["gains"], tde["over"]) == (True, {}, False)
     assert game.time == pytest.approx(0.5, abs=0.016)
+
+
+def test_a_controller_that_cannot_be_built_is_refused(monkeypatch):
+    game = flying()
+
+    def fail(*_: Any) -> None:
+        raise ZeroDivisionError("division by zero")
+
+    monkeypatch.setattr("artde_gym.play.player.policy_for", fail)
+    for words in ({"do": "controller", "player": 0, "name": "tde"}, {"do": "compare", "name": "tde"}):
+        assert "ZeroDivisionError: division by zero" in order(game, **words)
+        turns(game, 0.1)
+    assert [player.name for player in game.players] == ["artde"]
+    monkeypatch.setattr("artde_gym.play.text.make_controller", fail)
+    assert json.loads(start_text(game))["start"]["controllers"] == []
 
 
 @pytest.mark.parametrize("names", [[], ["tde", "artde", "pid"]])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import http.client
 import json
+import signal
 import socket
 import threading
 from collections.abc import Iterator
@@ -255,7 +256,7 @@ def test_orders_reach_the_simulation_and_its_news_the_browser(server, game):
 def test_the_command_serves_until_it_is_interrupted(monkeypatch):
     met: list[Any] = []
 
-    def interrupted(game: Game, server: Server) -> None:
+    def interrupted(game: Game, server: Server, going: Any) -> None:
         met.append((get(server, f"/?token={server.token}")[0], [player.name for player in game.players]))
         raise KeyboardInterrupt
 
@@ -270,6 +271,22 @@ def test_the_command_serves_until_it_is_interrupted(monkeypatch):
     plain = CliRunner().invoke(app, [*words, "--no-browser"])
     assert "ssh -L" in plain.output
     assert len(met) == 3
+
+
+def test_an_interruption_waits_for_the_end_of_a_round(monkeypatch):
+    """In the midst of `tell` it would leave threads that wait forever, and a command that does not end."""
+    reached: list[int] = []
+    tell, before = Server.tell, signal.getsignal(signal.SIGINT)
+
+    def told(server: Server, news: News) -> None:
+        signal.raise_signal(signal.SIGINT)
+        tell(server, news)
+        reached.append(1)
+
+    monkeypatch.setattr(Server, "tell", told)
+    done = CliRunner().invoke(app, ["play", "--env", "QuadInfinity-Payload-v0", "--port", "0", "--no-browser"])
+    assert (done.exit_code, done.exception, reached) == (0, None, [1])
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 @pytest.mark.parametrize("words", [["--port", "70000"], ["--port", "-1"], ["--controllers", "tde,artde,pid"]])

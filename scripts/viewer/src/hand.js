@@ -61,7 +61,9 @@ export class Hand {
     if (!this.held?.to) return;
     const { run, site, to } = this.held, from = run.robot.site(site), force = this.force();
     run.force = force.length();
-    if (from && run.force > 0) run.arrow.show(to, force, to.distanceTo(from));
+    if (!from || !run.force) return;
+    run.arrow.show(to, force, to.distanceTo(from));
+    run.arrow.ends.reverse();
   }
   release() {
     if (!this.held) return;

@@ -35,10 +35,9 @@ export class Live {
     const left = make("div", { class: "replay" }), right = make("aside", { "aria-label": "what can be done" });
     this.scene = new Scene(left, start, this.drawn, (site, force) => this.say({ do: "pull", site, force }));
     this.panel = new Panel(right, start, (order) => this.say(order));
-    left.append(this.panel.bar);
-    this.scene.charts(left);
+    left.append(this.panel.bar, this.panel.help, this.panel.refused);
     this.waiting.remove();
-    this.root.append(left, right);
+    this.root.append(left, this.scene.charts(), right);
   }
   #frame(data) {
     if (!this.told) return;
@@ -60,10 +59,12 @@ class Scene extends Stage {
     const { force, most } = start.push;
     if (start.able.push) this.hand = new Hand(this, start.sites, { stiffness: STIFFNESS * force, most, say: pull });
   }
-  charts(root) {
-    root.append(make("div", { class: "plots" }, ...this.strips.map((strip) => strip.element)));
-    new ResizeObserver(() => this.ask()).observe(root);
+  /** Make the charts, which stand beside or below the robots. */
+  charts() {
+    const charts = make("div", { class: "replay charts" }, make("div", { class: "plots" }, ...this.strips.map((strip) => strip.element))), seen = new ResizeObserver(() => this.ask());
+    for (const root of [this.root, charts]) seen.observe(root);
     darkness.addEventListener("change", () => this.ask());
+    return charts;
   }
   told(told) {
     const look = JSON.stringify([told.players.map(({ name, color }) => [name, color]), told.hook]);
@@ -77,7 +78,7 @@ class Scene extends Stage {
       this.first = first;
     }
     this.runs.forEach((run, i) => {
-      const player = told.players[i], [fell] = [player.fault || (player.fall && `fell at ${player.end.toFixed(2)} s (${player.fall})`)];
+      const player = told.players[i], [fell] = [player.fault || (player.fall && `fell at ${player.end.toFixed(2)}\u00a0s (${player.fall})`)];
       Object.assign(run, { pushes: told.pushes, end: player.over ? player.end : Infinity });
       run.tag.lastChild.textContent = fell || (player.over ? "the end" : "");
       run.robot?.gray(Boolean(fell));
@@ -106,7 +107,7 @@ class Scene extends Stage {
   turn() {
     const style = getComputedStyle(this.root), ink = (name) => style.getPropertyValue(name).trim();
     if (!this.runs.length) return;
-    this.tallest = Math.max(300, 0.6 * innerHeight);
+    this.tallest = Math.max(300, (this.root.clientWidth + 1 < innerWidth * 0.9 ? 0.6 : 0.42) * innerHeight);  // alone in its row, it stays in sight
     if (this.world && this.root.clientWidth) this.paintWorld();
     const spans = this.runs[0].pushes.filter((push) => push.end > this.time - SPAN && push.start <= this.time).map((push) => [push.start, push.end]);
     for (const strip of this.strips) strip.draw(this.time, this.runs, spans, ink);

@@ -29,10 +29,14 @@ export const button = (name, { icon, text, ...more } = {}) => {
 export const darkness = matchMedia("(prefers-color-scheme: dark)"), paper = matchMedia("print");
 export const isDark = () => darkness.matches && !paper.matches;
 
+const DIMMEST = 105;  // of 255, of a line in the dark; black would be lost there
+
 /** A controller's color that shows on the page, lifted in the dark as the report's charts lift it. */
-export const lifted = (color) => isDark()
-  ? "#" + [1, 3, 5].map((i) => Math.round(0.68 * parseInt(color.slice(i, i + 2), 16) + 0.32 * 255).toString(16).padStart(2, "0")).join("")
-  : color;
+export const lifted = (color) => {
+  if (!isDark()) return color;
+  const parts = [1, 3, 5].map((i) => 0.68 * parseInt(color.slice(i, i + 2), 16) + 0.32 * 255), lack = Math.max(0, DIMMEST - Math.max(...parts));
+  return `#${parts.map((part) => Math.round(part + lack).toString(16).padStart(2, "0")).join("")}`;
+};
 
 /** A round step of an axis that has about `count` of them. */
 export const roundStep = (span, count) => {

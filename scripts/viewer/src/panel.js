@@ -33,8 +33,9 @@ export class Panel {
   constructor(root, start, say) {
     Object.assign(this, { root, start, say, gains: [] });
     this.bar = this.#bar();
+    this.help = make("p", { class: "help" }, start.able.push ? "Drag a robot to pull it, drag beside it to turn the view." : "Drag to turn the view.", make("span", {}, ` Keys: ${start.able.push ? "arrows push, + and \u2212 change the size, " : ""}${start.able.drop ? "d drops, " : ""}space pauses, r resets, comma and period change the speed.`));
     this.refused = make("p", { class: "refused", role: "status" });
-    root.append(...(start.able.push ? [this.#pushes()] : []), ...(start.able.drop || start.able.attach ? [this.#payload()] : []), this.#who(), this.#gains(), ...this.#conditions(), this.#save(), this.refused);
+    root.append(...(start.able.push ? [this.#pushes()] : []), ...(start.able.drop || start.able.attach ? [this.#payload()] : []), this.#who(), this.#gains(), ...this.#conditions(), this.#save());
     addEventListener("keydown", (event) => this.#key(event));
   }
   #bar() {
@@ -120,7 +121,7 @@ export class Panel {
       if (on.checked) row.tell(told.conditions[kind]);
       else row.querySelector("output").textContent = "off";
     }
-    this.command.textContent = told.command;
+    this.command.replaceChildren(...told.command.split(/ (?=--)/).flatMap((word, i) => [...(i ? [" "] : []), make("span", {}, word)]));
     this.inexact.hidden = told.exact;
     this.refused.textContent = told.refused;
   }

@@ -22,7 +22,7 @@ export function axes(canvas, from, to, high, spans, ink) {
   g.setTransform(scale, 0, 0, scale, 0, 0);
   g.clearRect(0, 0, width, height);
   Object.assign(g, { font: "11px system-ui, sans-serif", fillStyle: ink("--soft"), textAlign: "right", strokeStyle: ink("--line"), lineWidth: 1 });
-  const step = roundStep(high, 3);
+  const step = roundStep(high, 5);
   for (let v = 0; v <= high; v += step) { g.beginPath(); g.moveTo(LEFT, y(v)); g.lineTo(width - RIGHT, y(v)); g.stroke(); g.fillText(String(Number(v.toPrecision(6))), LEFT - 5, y(v) + 4); }
   g.textAlign = "center";
   const second = roundStep(span, Math.max(2, width / 70)), first = Math.ceil(from / second - 1e-9) * second;

@@ -83,11 +83,11 @@ export class Replay extends Stage {
     const q = Array.from({ length: motion.joints }, (_, c) => value(7 + c)), ball = 7 + motion.joints;
     run.over = this.time >= run.end - 1e-6;
     run.center.set(value(0), value(1), value(2));
+    run.tag.lastChild.textContent = run.over && run.fall ? `fell at ${run.end.toFixed(2)}\u00a0s` : "";
     if (!robot) return;
     robot.pose(Array.from({ length: 7 }, (_, c) => value(c)), q, columns[Math.round(at) * size + ball + 3] > 0.5 ? [value(ball), value(ball + 1), value(ball + 2)] : null);
     robot.gray(run.over && Boolean(run.fall));
     run.trail.show(Math.floor(at / 2) + 1);
-    run.tag.lastChild.textContent = run.over && run.fall ? `fell at ${run.end.toFixed(2)} s` : "";
     this.pushed(run);
     this.pressed(run, this.data.scene.contacts.map((_, c) => (run.over ? 0 : value(ball + 4 + c))));
   }

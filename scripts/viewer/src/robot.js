@@ -138,7 +138,7 @@ export class Arrow extends Group {
     this.shaft.position.y = -this.cone;
     this.shaft.scale.y = Math.max(1e-3, length - this.cone);
     this.shaft.material.opacity = strength;
-    this.tail = tip.clone().addScaledVector(force.clone().normalize(), -length);
+    this.ends = [tip.clone().addScaledVector(force.clone().normalize(), -length), tip.clone()];  // its note stands beyond the first
   }
   dispose() { for (const mesh of [this.shaft, this.head]) { mesh.geometry.dispose(); mesh.material.dispose(); } }
 }

@@ -7,6 +7,8 @@ import { Path, Vector3, World } from "./world.js";
 const PUSH = "#c4163c", LOAD = "#2f80c9", FADE = 0.3;  // s, in which an arrow goes when its push is over
 const NARROW = 620, METERS_PER_NEWTON = 0.012, ARROW = [0.25, 0.6], LOAD_LENGTH = 0.0035;  // pixels, m/N, m, m/N
 const SHAPE = 0.78;  // height of a panel over its width, at most
+const ROOM = 0.4;  // m, around a path that is seen as a whole
+const LABEL = [32, 16];  // pixels, from the middle of a note to its arrow, across and up
 
 export class Stage {
   /** A stage in an element of the page; `drawn` says whether this browser can draw. */
@@ -16,20 +18,22 @@ export class Stage {
     this.stage = make("div", { class: "stage" });
     this.canvas = make("canvas", { tabindex: "0", role: "img", "aria-label": label });
     this.stage.append(this.canvas);
-    if (this.world) root.append(this.stage);
+    if (!this.world) { this.stage.className = "keys"; this.canvas.remove(); }  // the colors of the charts
+    root.append(this.stage);
   }
   /** Add a run's robot with its arrows; `trail` is its path over the ground (flat list). */
   add(run, trail) {
     const scene = this.sceneData, tag = make("div", { class: "tag" }, make("i"), run.name, make("b")), note = make("div", { class: "note" });
     run = { ...run, tag, note, center: new Vector3(), parts: [], arrows: [] };
-    if (!this.world) return run;
+    this.stage.append(tag);
+    if (!this.world) { tag.style.cssText = `--c:${lifted(run.color)}`; return run; }
     run.robot = new Robot(scene, run.color, run.hook);
     run.arrow = new Arrow(PUSH);
     run.arrows = scene.contacts.map(() => new Arrow(LOAD, 0.6));
     run.parts = [run.robot, run.arrow, ...run.arrows];
     if (trail) run.parts.push((run.trail = new Path(trail, run.color)));
     this.world.scene.add(...run.parts);
-    this.stage.append(tag, note);
+    this.stage.append(note);
     return run;
   }
   remove(run) {
@@ -66,12 +70,36 @@ export class Stage {
   /** The camera of `Outlook`. */
   home() {
     if (!this.orbit) return;
-    const { distance, yaw_deg: yaw, pitch_deg: pitch, height, follows } = this.outlook, y = (yaw * Math.PI) / 180, p = (pitch * Math.PI) / 180;
-    const away = new Vector3(-Math.sin(y) * Math.cos(p), Math.cos(y) * Math.cos(p), -Math.sin(p)), { center } = this.runs[0];
-    this.orbit.target.set(follows ? center.x : 0, follows ? center.y : 0, height);
-    this.world.camera.position.copy(this.orbit.target).addScaledVector(away, -distance * (this.together ? 1.15 : 1));
+    const { yaw_deg: yaw, pitch_deg: pitch, height, follows } = this.outlook, y = (yaw * Math.PI) / 180, p = (pitch * Math.PI) / 180;
+    const away = new Vector3(-Math.sin(y) * Math.cos(p), Math.cos(y) * Math.cos(p), -Math.sin(p)), { center } = this.runs[0], places = follows ? [] : this.#places();
+    const middle = (axis) => (Math.min(...places.map((place) => place[axis])) + Math.max(...places.map((place) => place[axis]))) / 2;
+    if (places.length) this.orbit.target.set(middle("x"), middle("y"), height);
+    else this.orbit.target.set(follows ? center.x : 0, follows ? center.y : 0, height);
+    this.world.camera.position.copy(this.orbit.target).addScaledVector(away, -this.#distance(places, away));
     this.orbit.update();
     this.ask();
+  }
+  /** Where the robots are meant to be, and are; nothing without a path. */
+  #places() {
+    const { path } = this.sceneData;
+    if (!path) return [];
+    return [...Array.from({ length: path.length / 3 }, (_, i) => new Vector3(...path.slice(3 * i, 3 * i + 3))), ...this.runs.map((run) => run.center)];
+  }
+  /** From where, looking that way at the orbit's target, all of the places are in the panel. */
+  #distance(places, away) {
+    const { w, h } = this.#panels(), [across, up] = this.world.slopes(w, h), right = new Vector3().crossVectors(away, new Vector3(0, 0, 1)).normalize(), top = new Vector3().crossVectors(right, away);
+    if (!places.length) return this.outlook.distance * (this.together ? 1.15 : 1);
+    return Math.max(...places.map((place) => {
+      const from = place.clone().sub(this.orbit.target);
+      return Math.max((Math.abs(from.dot(right)) + ROOM) / across, (Math.abs(from.dot(top)) + ROOM) / up) - from.dot(away);
+    }));
+  }
+  /** How many panels there are, and their size (pixels). */
+  #panels() {
+    const count = this.runs.length, width = this.root.clientWidth;
+    const columns = this.together ? 1 : Math.min(count, width < NARROW || (count === 4 && width < 1000) ? 2 : count), rows = this.together ? 1 : Math.ceil(count / columns);
+    const w = width / columns, h = Math.round(Math.min(this.tallest, Math.max(250, SHAPE * w)) * (rows > 1 ? 0.8 : 1));
+    return { columns, rows, w, h };
   }
   /** Show the push that acts at this time, or just did. */
   pushed(run) {
@@ -89,11 +117,9 @@ export class Stage {
     requestAnimationFrame((now) => { this.asked = false; this.turn(now); });
   }
   paintWorld() {
-    const { world, runs } = this, { camera } = world, count = runs.length, width = this.root.clientWidth;
-    const columns = this.together ? 1 : Math.min(count, width < NARROW || (count === 4 && width < 1000) ? 2 : count), rows = this.together ? 1 : Math.ceil(count / columns);
-    const w = width / columns, h = Math.round(Math.min(this.tallest, Math.max(250, SHAPE * w)) * (rows > 1 ? 0.8 : 1)), height = rows * h;
+    const { world, runs } = this, { camera } = world, { columns, rows, w, h } = this.#panels(), height = rows * h;
     if (this.stage.style.height !== `${height}px`) this.stage.style.height = `${height}px`;
-    world.begin(width, height);
+    world.begin(columns * w, height);
     const place = camera.position.clone(), first = runs[0].center;
     runs.forEach((run, i) => {
       const x = this.together ? 0 : (i % columns) * w, y = this.together ? 0 : Math.floor(i / columns) * h;
@@ -123,12 +149,14 @@ export class Stage {
     for (let i = 1; i < rows; i++) g.fillRect(0, Math.round(i * h * scale), this.canvas.width, 1);
   }
   #note(run, x, y, w, h) {
-    const on = run.arrow.shown && run.force > 0, p = on && run.arrow.tail.clone().project(this.world.camera);
-    const inside = on && Math.abs(p.x) < 1 && Math.abs(p.y) < 1;
+    const on = run.arrow.shown && run.force > 0, [end, other] = on ? run.arrow.ends.map((place) => place.clone().project(this.world.camera)) : [];
+    const inside = on && Math.abs(end.x) < 1 && Math.abs(end.y) < 1;
     run.note.style.display = inside ? "block" : "none";
     if (!inside) return;
-    run.note.style.left = `${Math.min(x + w - 28, Math.max(x + 28, x + ((p.x + 1) / 2) * w))}px`;
-    run.note.style.top = `${Math.max(y + 10, y - 16 + ((1 - p.y) / 2) * h)}px`;
+    const dx = ((end.x - other.x) * w) / 2, dy = ((other.y - end.y) * h) / 2, far = Math.min(LABEL[0] / Math.abs(dx), LABEL[1] / Math.abs(dy));
+    const at = (middle, low, high) => Math.min(high, Math.max(low, middle)), [left, top] = Number.isFinite(far) ? [far * dx, far * dy] : [0, -LABEL[1]];
+    run.note.style.left = `${x + at(((end.x + 1) / 2) * w + left, 28, w - 28)}px`;
+    run.note.style.top = `${y + at(((1 - end.y) / 2) * h + top, 10, h - 10)}px`;
     run.note.textContent = `${run.force.toPrecision(3)} N`;
   }
 }

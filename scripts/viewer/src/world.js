@@ -124,11 +124,16 @@ export class World {
     gl.clear();
     gl.render(this.scene, camera);
   }
-  /** Let the shorter side of a rectangle have the field of view. */
+  /** Tangents of half the field of view across and up, which the shorter side of a rectangle has. */
+  slopes(width, height) {
+    const half = Math.tan((FIELD_OF_VIEW * Math.PI) / 360), up = half / Math.min(1, width / height);
+    return [(up * width) / height, up];
+  }
+  /** Give the camera the shape of a rectangle. */
   shape(width, height) {
-    const half = Math.tan((FIELD_OF_VIEW * Math.PI) / 360), { camera } = this;
+    const { camera } = this, [, up] = this.slopes(width, height);
     camera.aspect = width / height;
-    camera.fov = (360 / Math.PI) * Math.atan(half / Math.min(1, camera.aspect));
+    camera.fov = (360 / Math.PI) * Math.atan(up);
     camera.updateProjectionMatrix();
     camera.updateMatrixWorld();
   }

@@ -53,6 +53,20 @@ def test_a_controllers_colour_is_lifted_in_the_dark_and_exact_in_the_light(brows
     assert browser.run(color) != light
 
 
+def test_black_shows_in_the_dark(browser, walks):
+    browser.open(walks / "report.html", dark=True)
+    seen = browser.run("""
+        (() => {
+          const line = document.querySelector('.chart svg .line, .chart svg .path');
+          line.style.setProperty('--c', '#000000');
+          const paint = document.createElement('canvas').getContext('2d');
+          paint.fillStyle = getComputedStyle(line).stroke;
+          paint.fillRect(0, 0, 1, 1);
+          return [...paint.getImageData(0, 0, 1, 1).data];
+        })()""")
+    assert min(seen[:3]) > 100
+
+
 def test_a_table_sorts_on_click_both_ways(browser, flights):
     browser.errors.clear()
     browser.open(flights / "report.html")

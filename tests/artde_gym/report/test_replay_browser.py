@@ -57,6 +57,16 @@ CLICK = """
   chart.setPointerCapture = () => {};
   chart.dispatchEvent(new PointerEvent("pointerdown", { clientX: box.left + 40 + (box.width - 48) / 2 }));
 })()"""
+BESIDE = """
+(() => {
+  const { runs: [run], canvas } = document.querySelector(".replay").replay, { x, y, w, h, camera } = run.seen;
+  const [tail, tip] = run.arrow.ends.map((place) => {
+    const p = place.clone().project(camera);
+    return [x + ((p.x + 1) / 2) * w, y + ((1 - p.y) / 2) * h];
+  });
+  const note = run.note.getBoundingClientRect(), box = canvas.getBoundingClientRect();
+  return [[(note.left + note.right) / 2 - box.left, (note.top + note.bottom) / 2 - box.top], tip, tail];
+})()"""
 LEVER = 1.0  # m, that a turn moves a site by
 
 
@@ -190,6 +200,26 @@ def test_a_drag_turns_the_view_and_reset_brings_it_back(solid_browser, walk):
     np.testing.assert_allclose(solid_browser.run(eye), before, atol=1e-9)
 
 
+@pytest.mark.parametrize("width", [375, 1280])
+def test_a_whole_flight_is_in_sight(solid_browser, tmp_path, width):
+    page = artde_gym.replay(
+        ["tde", "artde"], "QuadInfinity-Payload-v0", env_kwargs={"duration": 15.0, "engine": "mujoco"}, disturbances={}
+    )
+    shown(solid_browser, page.save(tmp_path / "x.html"), width)
+    for share in (0.0, 0.3, 0.6, 1.0):
+        solid_browser.run(f"{REPLAY}.seek({share} * {REPLAY}.length)")
+        solid_browser.run(f"{REPLAY}.paint()")
+        place = solid_browser.run(f"{REPLAY}.runs[0].center.clone().project({REPLAY}.runs[0].seen.camera).toArray()")
+        assert np.abs(place[:2]).max() < 0.9
+
+
+def test_the_size_of_a_push_stands_beside_its_arrow(solid_browser, walk):
+    shown(solid_browser, walk)
+    solid_browser.run(f"{REPLAY}.seek(0.35); {REPLAY}.paint()")
+    note, tip, tail = solid_browser.run(BESIDE)
+    assert np.dot(np.subtract(note, tail), np.subtract(tip, tail)) < 0  # beyond the end that does not touch the robot
+
+
 def test_a_fall_is_frozen_and_gray(solid_browser, tmp_path):
     class Rest:
         def predict(self, observation, state=None, episode_start=None, deterministic=True):
@@ -219,7 +249,7 @@ def test_a_report_shows_the_worst_the_median_and_the_best(solid_browser, report)
     assert solid_browser.run(f"{SHOWN}.querySelectorAll('.tag').length") == 2
     text = report.read_text()
     assert text.count('<div class="replay"') == 1
-    assert "`artde-gym replay` runs its episodes again" in text
+    assert "runs an episode again from its seed" in text
 
 
 def test_it_lives_in_a_frame_without_an_origin(solid_browser, walk, tmp_path):
@@ -246,10 +276,21 @@ def test_a_hostile_name_is_text(solid_browser, tmp_path):
     assert solid_browser.run(f"{REPLAY}.runs[0].tag.textContent") == name
 
 
+def test_black_shows_in_the_dark(solid_browser, tmp_path):
+    page = artde_gym.replay(
+        {"computed-torque": "tde"}, "QuadInfinity-Payload-v0", env_kwargs={"duration": 0.1}, disturbances={}
+    )
+    assert page.figures[0]["episodes"][0]["runs"][0]["color"] == "#000000"
+    shown(solid_browser, page.save(tmp_path / "x.html"), dark=True)
+    key = f"getComputedStyle({SHOWN}.querySelector('.tag i')).backgroundColor.match(/[0-9]+/g).map(Number)"
+    assert min(solid_browser.run(key)) > 100
+
+
 def test_without_webgl_a_sentence_events_and_charts(browser, walk):
     shown(browser, walk)
     assert "no WebGL" in browser.run(f"{SHOWN}.querySelector('.failed').textContent")
     assert browser.run(f"{SHOWN}.querySelector('.stage')") is None
+    assert browser.run(f"[...{SHOWN}.querySelectorAll('.keys .tag')].map((one) => one.textContent)") == ["tde", "artde"]
     browser.run(f"{SHOWN}.querySelector('.events .push').click()")
     assert browser.run(f"{REPLAY}.time") == pytest.approx(0.3)
 
