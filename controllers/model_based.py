@@ -21,6 +21,8 @@ class ComputedTorquePolicy(TrackingPolicy):
     The model is the robot without payload, pushes and friction; the pattern says how feet share the load.
     """
 
+    any_library = False  # the model is NumPy's
+
     def __init__(self, interface: ControlInterface, gains: ComputedTorqueGains) -> None:
         super().__init__("computed-torque", interface, gains)
         spec = interface.nominal_robot

@@ -9,13 +9,14 @@ from __future__ import annotations
 import abc
 import copy
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from artde_gym.errors import OptionError
 from artde_gym.layout import Layout
+from controllers.laws.namespaces import namespace
 from controllers.laws.tracking import Array, JointInput, LawState
 from controllers.stacked import stacked_gains
 
@@ -47,7 +48,12 @@ class Policy(abc.ABC):
         name: under which results are listed.
         interface: the environment that it drives.
         gains: of the law, in its own terms.
+
+    Attributes:
+        any_library: whether observations keep their array library; otherwise they become NumPy's.
     """
+
+    any_library = True
 
     def __init__(self, name: str, interface: ControlInterface, gains: Any) -> None:
         self.name = name
@@ -84,7 +90,8 @@ class Policy(abc.ABC):
         """Return the action for one observation (n_obs,) or for many (n_env, n_obs).
 
         Args:
-            observation: as the environment gave it; float32 stays float32.
+            observation: as the environment gave it; float32 stays float32. An array of another library, from a
+                simulation in JAX or PyTorch, gives an action of that library, in `jit` and `vmap` too.
             state: what the call before returned; None at the start.
             episode_start: one truth value an environment; where it is true, that environment's state is cleared.
             deterministic: of the protocol; a law has no randomness.
@@ -94,19 +101,23 @@ class Policy(abc.ABC):
             OptionError: if the observation's last axis is not as long as the environment's.
         """
         del deterministic
-        given = np.asarray(observation)
+        xp = namespace(observation) if self.any_library else np
+        given = np.asarray(observation) if xp is np else cast(Array, observation)
         if given.shape[-1:] != (self._size,):
             raise OptionError("shape of the observation", given.shape, f"(..., {self._size})")
         signals = self.read(given)
         if state is None:
             state = self.start(signals)
         elif episode_start is not None:
-            fresh = np.asarray(episode_start, dtype=np.bool_).reshape(given.shape[:-1])
-            if fresh.any():
-                state = choose(fresh, self.start(signals), state)
+            fresh = xp.asarray(episode_start, dtype=xp.bool).reshape(given.shape[:-1])
+            if xp is not np or fresh.any():
+                state = choose(fresh, self.start(signals), state, xp)
         if residual is not None:
-            signals = self.with_residual(signals, np.asarray(residual, dtype=given.dtype))
+            signals = self.with_residual(signals, xp.asarray(residual, dtype=given.dtype))
         force, state = self.step(state, signals, given)
+        if xp is not np:
+            low, high = (xp.asarray(bound, dtype=force.dtype) for bound in (self._low, self._high))
+            return xp.minimum(xp.maximum(force, low), high), state
         clipped = np.minimum(np.maximum(force, self._low), self._high)
         return clipped if clipped.dtype == force.dtype else clipped.astype(force.dtype), state
 
@@ -157,14 +168,14 @@ class TrackingPolicy(Policy):
         return signals._replace(qdd_ref=signals.qdd_ref + du)
 
 
-def choose(mask: NDArray[np.bool_], fresh: Array | LawState, kept: Array | LawState) -> Any:
+def choose(mask: NDArray[np.bool_], fresh: Array | LawState, kept: Array | LawState, xp: Any = np) -> Any:
     """Nested tuples of arrays: `fresh` where the mask is true, `kept` elsewhere; the mask covers leading axes."""
     if isinstance(fresh, tuple):
-        merged = [choose(mask, *pair) for pair in zip(fresh, kept, strict=True)]
+        merged = [choose(mask, *pair, xp) for pair in zip(fresh, kept, strict=True)]
         kind: Any = type(fresh)
         return kind(*merged) if hasattr(kind, "_fields") else kind(merged)
-    new, old = np.asarray(fresh), np.asarray(kept)
-    return np.where(mask.reshape(mask.shape + (1,) * (old.ndim - mask.ndim)), new, old)
+    new, old = xp.asarray(fresh), xp.asarray(kept)
+    return xp.where(mask.reshape(mask.shape + (1,) * (old.ndim - mask.ndim)), new, old)
 
 
 def flatten(state: Any) -> dict[str, Array]:

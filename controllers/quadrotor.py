@@ -9,6 +9,7 @@ import numpy as np
 
 from controllers.law_table import LAWS, Entry
 from controllers.laws.cascade import CascadeGains, CascadeState, QuadrotorInput, attitude_errors, cascade, cascade_init
+from controllers.laws.namespaces import namespace
 from controllers.laws.tracking import Array, LawState
 from controllers.laws.vectors import Axes, joined
 from controllers.policies import ControlInterface, Policy, flatten
@@ -43,8 +44,12 @@ class QuadrotorPolicy(Policy):
 
     def read(self, observation: Array) -> QuadrotorInput:
         last = observation.ndim - 1
-        columns = np.ascontiguousarray(observation.transpose(last, *range(last)))
-        rows = columns.transpose(*range(1, last + 1), 0)
+        xp = namespace(observation)
+        if xp is np:
+            columns = np.ascontiguousarray(observation.transpose(last, *range(last)))
+            rows = columns.transpose(*range(1, last + 1), 0)
+        else:
+            columns, rows = xp.moveaxis(observation, -1, 0), observation
         at = self._at
         rotation, wrench = columns[at["rot_body_to_world"]], columns[at["wrench_applied"]]
         x, y, z = ((rotation[i], rotation[3 + i], rotation[6 + i]) for i in range(3))

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from controllers.laws.array_gains import with_arrays
 from controllers.laws.tde import TdeGains
 
 RATES = ("gamma_0", "gamma_1")
@@ -26,7 +26,7 @@ def stacked_gains(gains: Sequence[Any]) -> Any | None:
     first = gains[0]
     if any(type(one) is not type(first) for one in gains):
         return None
-    made: Any = copy.copy(first)
+    changed: dict[str, Any] = {}
     for field in dataclasses.fields(first):
         values: list[Any] = [getattr(one, field.name) for one in gains]
         if all(value == values[0] for value in values):
@@ -34,8 +34,8 @@ def stacked_gains(gains: Sequence[Any]) -> Any | None:
         value = _stacked(first, field.name, values)
         if value is None:
             return None
-        object.__setattr__(made, field.name, value)  # frozen, and each of the gains has been checked
-    return made
+        changed[field.name] = value
+    return with_arrays(first, **changed)  # each of the gains has been checked
 
 
 def _stacked(gains: Any, name: str, values: Sequence[Any]) -> Any | None:

@@ -33,6 +33,7 @@ GROUPS = {
     ),
     "tianshou": Group((".[mujoco,rl]", "tianshou>=2"), ("tianshou",), free=("filelock",)),
     "rllib": Group((".[mujoco]", "ray[rllib]", "torch"), ("rllib",), free=("gymnasium",)),
+    "jax": Group((".", "jax"), ("jax",)),  # no learning library: the laws run on its arrays
 }
 
 

@@ -107,7 +107,8 @@ def test_there_is_enough_to_run():
 
 def needing(name: str) -> Any:
     """A script by name, marked if it needs PyTorch."""
-    return pytest.param(name, marks=[pytest.mark.torch] if "stable_baselines3" in SCRIPTS[name] else [])
+    torch = any(package in SCRIPTS[name] for package in ("stable_baselines3", "import torch"))
+    return pytest.param(name, marks=[pytest.mark.torch] if torch else [])
 
 
 @pytest.mark.parametrize("name", [needing(name) for name in SCRIPTS])

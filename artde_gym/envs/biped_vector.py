@@ -50,6 +50,7 @@ As in the single environment, each entry `x` with a mask `_x` (n,), in nested di
 COLUMNS = task.OBSERVATION.slices
 PLAN = slice(COLUMNS["q_ref"].start, COLUMNS["qdd_ref"].stop)
 CLOCK = slice(COLUMNS["load_left_ref"].start, COLUMNS["phase"].stop)
+KNOWN = 256  # settled robots that are kept for later resets
 BASE = slice(COLUMNS["base_height"].start, COLUMNS["base_angular_velocity"].stop)
 
 _ARCTANGENT, _ARCSINE, _EXP = vectorize(math.atan2), vectorize(arcsine), vectorize(math.exp)
@@ -116,6 +117,7 @@ class BipedVectorEnv(JointVectorEnv[task.Walk]):
         first = np.zeros(1, np.int32)
         self._batch.worlds[0].set_friction(task.FRICTION)
         self._batch.reset(0, walk.position, walk.start)
+        self._known: dict[bytes, tuple[Any, Array]] = {}  # settled robots and their torques
         self._still = self._settle(first, walk.start[None], task.SETTLE_STEPS)[0]
         self._settled = self._batch.save_state(0)
 
@@ -134,8 +136,24 @@ class BipedVectorEnv(JointVectorEnv[task.Walk]):
             if steps := task.settling(sampled):
                 restless.setdefault(steps, []).append(i)
         for steps, some in restless.items():
-            poses = np.array([self._task.pose(robots[i]) for i in some])
-            self._tau[some] = self._settle(np.array(some, np.int32), poses, steps)
+            self._settle_alike({i: robots[i] for i in some}, steps)
+
+    def _settle_alike(self, drawn: Mapping[int, Mapping[str, Any]], steps: int) -> None:
+        """Let robots settle, one for all that are disturbed alike; those known from an earlier reset not at all."""
+        alike: dict[bytes, list[int]] = {}
+        for i, sampled in drawn.items():
+            alike.setdefault(task.settled_by(sampled), []).append(i)
+        new = {key: robots[0] for key, robots in alike.items() if key not in self._known}
+        if new:
+            some = [*new.values()]
+            poses = np.array([self._task.pose(drawn[i]) for i in some])
+            last = self._settle(np.array(some, np.int32), poses, steps)
+            self._known |= {key: (self._batch.motion(i), tau) for (key, i), tau in zip(new.items(), last, strict=True)}
+        for key, robots in alike.items():
+            motion, self._tau[robots] = self._known[key]
+            self._batch.set_motion(np.array(robots, np.int32), motion)
+        for key in [*self._known][:-KNOWN]:
+            del self._known[key]
 
     def _begin_pulses(self, i: int, entry: Mapping[str, Any] | None) -> None:
         if entry is not None and self._pulses is None:

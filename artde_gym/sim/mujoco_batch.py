@@ -5,7 +5,7 @@ Each world behaves bitwise like `MujocoEngine`, for any number of worlds and thr
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import mujoco
 import numpy as np
@@ -22,6 +22,8 @@ mj: Any = mujoco  # compiled, without type information
 
 Ids = NDArray[np.int32]
 """Indices of worlds, sorted and unique."""
+Motion: TypeAlias = tuple[Array, Array, Array]
+"""State, loads on the feet and friction of a world."""
 
 
 class States(NamedTuple):
@@ -71,7 +73,7 @@ class MujocoBatch:
         fields = [*map(batch.expand, FIELDS), self._pushes]
         self._friction = fields[FIELDS.index("pair_friction")]
         self.worlds = [_Row(blueprint, Fields(*(field[i] for field in fields)), self, i) for i in range(n)]
-        self._snapshots: list[tuple[Array, Array, Array]] = []
+        self._snapshots: list[Motion] = []
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state of a copy: independent worlds that step bitwise like these."""
@@ -101,16 +103,22 @@ class MujocoBatch:
 
     def save_state(self, world: int) -> int:
         """Save the state of a world without a payload; return a handle."""
-        parts = (self._batch.state, self._forces, self._friction)
-        state, forces, friction = (part[world].copy() for part in parts)
-        self._snapshots.append((state, forces, friction))
+        self._snapshots.append(self.motion(world))
         return len(self._snapshots) - 1
 
     def restore_state(self, worlds: Ids, snapshot: int) -> None:
         """Restore a saved state in some worlds bitwise; payloads are removed."""
         for world in worlds.tolist():
             self.worlds[world].release_payload()
-        self._batch.state[worlds], self._forces[worlds], self._friction[worlds] = self._snapshots[snapshot]
+        self.set_motion(worlds, self._snapshots[snapshot])
+
+    def motion(self, world: int) -> Motion:
+        """Return a copy of the motion of a world: its state, the loads on its feet, and the friction."""
+        return self._batch.state[world].copy(), self._forces[world].copy(), self._friction[world].copy()
+
+    def set_motion(self, worlds: Ids, motion: Motion) -> None:
+        """Give some worlds a motion bitwise; their masses, gravity and payloads must be those that it was made with."""
+        self._batch.state[worlds], self._forces[worlds], self._friction[worlds] = motion
 
     def state(self) -> States:
         """Return the current states; where possible views, which the next step changes."""

@@ -1,1 +1,1 @@
-"""Control laws as pure functions of NumPy arrays."""
+"""Control laws as pure functions of arrays: NumPy's, or those of any other library (`controllers.laws.namespaces`)."""

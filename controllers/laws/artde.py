@@ -15,11 +15,10 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Literal, NamedTuple
-
-import numpy as np
+from typing import Any, Literal, NamedTuple
 
 from controllers.laws.errors import GainError
+from controllers.laws.namespaces import namespace, root
 from controllers.laws.tde import TdeGains, TdeState, tde_init, time_delay
 from controllers.laws.tracking import (
     Array,
@@ -91,8 +90,9 @@ class ArtdeState(NamedTuple):
 
 def artde_init(gains: ArtdeGains, signals: JointInput, period: float) -> ArtdeState:
     """Memory before the first sample, as if s had been the same just before."""
-    s = sliding_variable(*errors(signals), gains.k_p, gains.k_d)
-    beta = np.full(s.shape[:-1], gains.beta_start, dtype=s.dtype)
+    xp = namespace(signals.q)
+    s = sliding_variable(*errors(signals), gains.k_p, gains.k_d, xp)
+    beta = xp.full(s.shape[:-1], gains.beta_start, dtype=s.dtype)
     return ArtdeState(tde_init(signals, period), s, beta, beta, beta)
 
 
@@ -105,29 +105,30 @@ def artde(
     m_bar: Array | None = None,
 ) -> tuple[Array, ArtdeState]:
     """One sample of the law at the top; `du` (..., n) is added to the robust term, `m_bar` as for TDE."""
+    xp = namespace(signals.q)
     e, ed = errors(signals)
-    s = sliding_variable(e, ed, gains.k_p, gains.k_d)
-    s_squared = inner(s, s)
-    xi = np.sqrt(inner(e, e) + inner(ed, ed))
+    s = sliding_variable(e, ed, gains.k_p, gains.k_d, xp)
+    s_squared = inner(s, s, xp)
+    xi = root(inner(e, e, xp) + inner(ed, ed, xp), xp)
     c = state.beta_0 + state.beta_1 * xi
-    robust = (gains.alpha * c / np.sqrt(s_squared + gains.eps))[..., None] * s
-    u = desired_acceleration(signals, e, ed, gains.k_p, gains.k_d) + robust
+    robust = (gains.alpha * c / xp.sqrt(s_squared + gains.eps))[..., None] * s
+    u = desired_acceleration(signals, e, ed, gains.k_p, gains.k_d, xp) + robust
     own = gains.m_bar if m_bar is None else m_bar
-    tau, tde_state = time_delay(own, state.tde, signals, u if du is None else u + du, period)
-    return tau, ArtdeState(tde_state, s, *_adapt(gains, state, s, s_squared, xi, period), c)
+    tau, tde_state = time_delay(own, state.tde, signals, u if du is None else u + du, period, xp)
+    return tau, ArtdeState(tde_state, s, *_adapt(gains, state, s, s_squared, xi, period, xp), c)
 
 
 def _adapt(
-    gains: ArtdeGains, state: ArtdeState, s: Array, s_squared: Array, xi: Array, period: float
+    gains: ArtdeGains, state: ArtdeState, s: Array, s_squared: Array, xi: Array, period: float, xp: Any
 ) -> tuple[Array, Array]:
     """Return the gains for the next sample."""
-    weight = np.sqrt(s_squared)
+    weight = root(s_squared, xp)
     if gains.growth == "midpoint":
-        before = inner(state.s, state.s)
+        before = inner(state.s, state.s, xp)
         grows = s_squared > before
-        weight = 0.5 * (weight + np.sqrt(before))
+        weight = 0.5 * (weight + root(before, xp))
     else:
-        grows = s_squared > inner(s, state.s)  # s_k^T (s_k - s_k-1) > 0
+        grows = s_squared > inner(s, state.s, xp)  # s_k^T (s_k - s_k-1) > 0
     if not gains.clamp:
         grows = grows | (state.beta_0 <= gains.beta_floor) | (state.beta_1 <= gains.beta_floor)
     signed = signed_step(period * weight, grows)
@@ -137,7 +138,7 @@ def _adapt(
             change = change - (period * gains.leakage) * (beta - gains.beta_floor)
         beta = beta + change
         if gains.clamp:
-            beta = np.maximum(beta, gains.beta_floor)
-        return np.minimum(beta, gains.cap) if math.isfinite(gains.cap) else beta
+            beta = xp.maximum(beta, gains.beta_floor)
+        return xp.minimum(beta, gains.cap) if math.isfinite(gains.cap) else beta
 
     return moved(state.beta_0, gains.gamma_0 * signed), moved(state.beta_1, gains.gamma_1 * (xi * signed))

@@ -19,11 +19,13 @@ adaptive sliding mode control" (2010).
 from __future__ import annotations
 
 import dataclasses
-from typing import NamedTuple
+import functools
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from controllers.laws.errors import GainError
+from controllers.laws.namespaces import namespace, root
 from controllers.laws.tracking import (
     Array,
     Gain,
@@ -92,34 +94,41 @@ def asmc_init(gains: AsmcGains, signals: JointInput) -> AsmcState:
     """Memory before the first sample: the inertia's ratio is the one for which the force that acts holds the weight."""
     e, ed = errors(signals)
     s = ed + gains.slope * e
-    c = np.full(s.shape[:-1], gains.c_floor, dtype=s.dtype)
+    xp = namespace(s)
+    c = xp.full(s.shape[:-1], gains.c_floor, dtype=s.dtype)
     if not gains.gravity:
-        return AsmcState(s, c, np.ones_like(c))
-    weight = times(gains.m_bar, _lifted(gains, np.zeros_like(s)))
-    return AsmcState(s, c, _bounded(gains, inner(signals.tau_applied, weight) / inner(weight, weight)))
+        return AsmcState(s, c, xp.ones_like(c))
+    weight = times(gains.m_bar, _lifted(gains, xp.zeros_like(s), xp), xp)
+    return AsmcState(s, c, _bounded(gains, inner(signals.tau_applied, weight, xp) / inner(weight, weight, xp), xp))
 
 
 def asmc(gains: AsmcGains, state: AsmcState, signals: JointInput, period: float) -> tuple[Array, AsmcState]:
     """One sample of the law at the top; what sample k teaches acts from k + 1 on."""
+    xp = namespace(signals.q)
     e, ed = errors(signals)
     s = ed + gains.slope * e
-    s_squared = inner(s, s)
-    reach = gains.k_s + state.c / np.sqrt(s_squared + gains.eps)
-    lifted = _lifted(gains, signals.qdd_ref + gains.slope * ed + reach[..., None] * s)
-    tau = state.r[..., None] * times(gains.m_bar, lifted)
-    c = state.c + period * (gains.gamma_c * np.sqrt(s_squared) - gains.leakage_c * (state.c - gains.c_floor))
-    r = state.r + period * (gains.gamma_r * inner(s, lifted) - gains.leakage_r * (state.r - 1.0))
-    return tau, AsmcState(s, c, _bounded(gains, r))
+    s_squared = inner(s, s, xp)
+    reach = gains.k_s + state.c / xp.sqrt(s_squared + gains.eps)
+    lifted = _lifted(gains, signals.qdd_ref + gains.slope * ed + reach[..., None] * s, xp)
+    tau = state.r[..., None] * times(gains.m_bar, lifted, xp)
+    c = state.c + period * (gains.gamma_c * root(s_squared, xp) - gains.leakage_c * (state.c - gains.c_floor))
+    r = state.r + period * (gains.gamma_r * inner(s, lifted, xp) - gains.leakage_r * (state.r - 1.0))
+    return tau, AsmcState(s, c, _bounded(gains, r, xp))
 
 
-def _lifted(gains: AsmcGains, u: Array) -> Array:
+def _lifted(gains: AsmcGains, u: Array, xp: Any) -> Array:
     """u - g."""
     if not gains.gravity:
         return u
-    up = np.zeros(u.shape[-1], dtype=u.dtype)
-    up[-1] = gains.gravity
-    return u + up
+    return u + xp.asarray(_up(u.shape[-1], gains.gravity), dtype=u.dtype)
 
 
-def _bounded(gains: AsmcGains, r: Array) -> Array:
-    return np.minimum(np.maximum(r, 1.0 / gains.r_max), gains.r_max)
+@functools.lru_cache(maxsize=16)
+def _up(axes: int, gravity: float) -> Array:
+    up = np.zeros(axes)
+    up[-1] = gravity
+    return up
+
+
+def _bounded(gains: AsmcGains, r: Array, xp: Any) -> Array:
+    return xp.minimum(xp.maximum(r, 1.0 / gains.r_max), gains.r_max)

@@ -14,9 +14,8 @@ from __future__ import annotations
 import dataclasses
 from typing import NamedTuple
 
-import numpy as np
-
 from controllers.laws.errors import GainError
+from controllers.laws.namespaces import namespace, root
 from controllers.laws.tde import TdeGains, TdeState, tde_init, time_delay
 from controllers.laws.tracking import (
     Array,
@@ -69,8 +68,9 @@ class AtdeState(NamedTuple):
 
 def atde_init(gains: AtdeGains, signals: JointInput, period: float) -> AtdeState:
     """Memory before the first sample, as if s had been the same just before."""
-    s = sliding_variable(*errors(signals), gains.k_p, gains.k_d)
-    return AtdeState(tde_init(signals, period), s, np.full(s.shape[:-1], gains.c_start, dtype=s.dtype))
+    xp = namespace(signals.q)
+    s = sliding_variable(*errors(signals), gains.k_p, gains.k_d, xp)
+    return AtdeState(tde_init(signals, period), s, xp.full(s.shape[:-1], gains.c_start, dtype=s.dtype))
 
 
 def atde(
@@ -82,13 +82,14 @@ def atde(
     m_bar: Array | None = None,
 ) -> tuple[Array, AtdeState]:
     """One sample of the law at the top; `du` (..., n) is added to the robust term, `m_bar` as for TDE."""
+    xp = namespace(signals.q)
     e, ed = errors(signals)
-    s = sliding_variable(e, ed, gains.k_p, gains.k_d)
-    s_squared = inner(s, s)
-    robust = (gains.alpha * state.c / np.sqrt(s_squared + gains.eps))[..., None] * s
-    grows = (state.c <= gains.c_floor) | (s_squared > inner(state.s, state.s))
-    change = signed_step((period * gains.gamma_0) * np.sqrt(s_squared), grows)
-    u = desired_acceleration(signals, e, ed, gains.k_p, gains.k_d) + robust
+    s = sliding_variable(e, ed, gains.k_p, gains.k_d, xp)
+    s_squared = inner(s, s, xp)
+    robust = (gains.alpha * state.c / xp.sqrt(s_squared + gains.eps))[..., None] * s
+    grows = (state.c <= gains.c_floor) | (s_squared > inner(state.s, state.s, xp))
+    change = signed_step((period * gains.gamma_0) * root(s_squared, xp), grows)
+    u = desired_acceleration(signals, e, ed, gains.k_p, gains.k_d, xp) + robust
     own = gains.m_bar if m_bar is None else m_bar
-    tau, tde_state = time_delay(own, state.tde, signals, u if du is None else u + du, period)
+    tau, tde_state = time_delay(own, state.tde, signals, u if du is None else u + du, period, xp)
     return tau, AtdeState(tde_state, s, state.c + change)

@@ -14,7 +14,7 @@ for quadrotors" (2011), and Lee, Leok, McClamroch, "Geometric tracking control o
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,9 +30,9 @@ class Heading(NamedTuple):
     rate: Array
 
 
-def heading(yaw: Array, rate: Array) -> Heading:
+def heading(yaw: Array, rate: Array, xp: Any = np) -> Heading:
     """Return the heading of a yaw angle (rad) that turns at `rate` (rad/s)."""
-    return Heading(np.cos(yaw), np.sin(yaw), rate)
+    return Heading(xp.cos(yaw), xp.sin(yaw), rate)
 
 
 def attitude_error(axes: Axes, axes_ref: Axes) -> Vector:
@@ -45,15 +45,15 @@ def attitude_error(axes: Axes, axes_ref: Axes) -> Vector:
     )
 
 
-def desired_axes(force: Vector, towards: Heading) -> Axes:
+def desired_axes(force: Vector, towards: Heading, xp: Any = np) -> Axes:
     """R_d: z along `force` (N, world), x = y_A x z normalized, y = z x x (Dantu 2023, equation 3.16).
 
     The force must not vanish, nor be parallel to the heading's y axis.
     """
-    z = scaled(1 / np.sqrt(dot(force, force)), force)
+    z = scaled(1 / xp.sqrt(dot(force, force)), force)
     # y_A x z with y_A = (-sin, cos, 0)
     across = towards.cos * z[2], towards.sin * z[2], -towards.sin * z[1] - towards.cos * z[0]
-    x = scaled(1 / np.sqrt(dot(across, across)), across)
+    x = scaled(1 / xp.sqrt(dot(across, across)), across)
     return x, cross(z, x), z
 
 

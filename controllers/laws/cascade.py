@@ -29,10 +29,9 @@ import dataclasses
 import math
 from typing import Any, Literal, NamedTuple
 
-import numpy as np
-
 from controllers.laws.attitude import attitude_error, desired_axes, desired_rates, heading
 from controllers.laws.errors import GainError
+from controllers.laws.namespaces import namespace, root
 from controllers.laws.second_order import FilterState, second_order
 from controllers.laws.tracking import (
     Array,
@@ -150,12 +149,13 @@ def cascade_init(
     position: Law, attitude: Law, gains: CascadeGains, flight: QuadrotorInput, period: float
 ) -> CascadeState:
     """Memory before the first sample: as if the thrust that acts had been asked for, at rest, for long."""
-    outer = _position_signals(flight, joined(scaled(flight.thrust_applied, flight.axes[2])))
-    force = joined(_within_reach(gains, components(outer.tau_applied)))
-    rest = FilterState(force, np.zeros_like(force))
-    command = rest if gains.command == "filtered" else _reference_command(gains, force, flight)
-    axes_ref, rates_ref = _attitude_command(command, flight, 0.0)
-    inner = _attitude_signals(gains, flight, axes_ref, rates_ref, scaled(0.0, rates_ref))
+    xp = namespace(flight.position)
+    outer = _position_signals(flight, joined(scaled(flight.thrust_applied, flight.axes[2]), xp))
+    force = joined(_within_reach(gains, components(outer.tau_applied), xp), xp)
+    rest = FilterState(force, xp.zeros_like(force))
+    command = rest if gains.command == "filtered" else _reference_command(gains, force, flight, xp)
+    axes_ref, rates_ref = _attitude_command(command, flight, 0.0, xp)
+    inner = _attitude_signals(gains, flight, axes_ref, rates_ref, scaled(0.0, rates_ref), xp)
     return CascadeState(
         position.start(gains.position, outer, period),
         attitude.start(gains.attitude, inner, period),
@@ -170,27 +170,29 @@ def cascade(
     position: Law, attitude: Law, gains: CascadeGains, state: CascadeState, flight: QuadrotorInput, period: float
 ) -> tuple[Array, CascadeState]:
     """One sample of the cascade at the top: the wrench [u1 (N), u2, u3, u4 (Nm)] (..., 4), and its memory."""
+    xp = namespace(flight.position)
     if gains.remembered_force == "applied":
         thrust_axis = scaled(0.5, plus(state.axes[2], flight.axes[2]))
-        applied = joined(scaled(flight.thrust_applied, thrust_axis))
+        applied = joined(scaled(flight.thrust_applied, thrust_axis), xp)
     else:
         applied = state.force
     force, position_state = position.step(gains.position, state.position, _position_signals(flight, applied), period)
-    reachable = _within_reach(gains, components(force))
-    force = joined(reachable)
+    reachable = _within_reach(gains, components(force), xp)
+    force = joined(reachable, xp)
 
-    command, axes_ref, rates_ref, turning = _command(gains, state.command, force, flight, period)
-    inner = _attitude_signals(gains, flight, axes_ref, rates_ref, turning)
+    command, axes_ref, rates_ref, turning = _command(gains, state.command, force, flight, period, xp)
+    inner = _attitude_signals(gains, flight, axes_ref, rates_ref, turning, xp)
     torque, attitude_state = attitude.step(gains.attitude, state.attitude, inner, period)
     thrust = dot(reachable, flight.axes[2])
-    wrench = joined((thrust, *components(torque)))
+    wrench = joined((thrust, *components(torque)), xp)
     return wrench, CascadeState(position_state, attitude_state, command, force, flight.axes, axes_ref)
 
 
 def attitude_errors(gains: CascadeGains, state: CascadeState, flight: QuadrotorInput) -> tuple[Array, Array]:
     """e_q and e_w (..., 3) that the attitude law is about to see, for the command "filtered" exactly."""
-    axes_ref, rates_ref = _attitude_command(state.command, flight, 0.0)
-    q, qd_ref = _attitude_feedback(gains, flight, axes_ref, rates_ref, _carried(flight, axes_ref, rates_ref))
+    xp = namespace(flight.position)
+    axes_ref, rates_ref = _attitude_command(state.command, flight, 0.0, xp)
+    q, qd_ref = _attitude_feedback(gains, flight, axes_ref, rates_ref, _carried(flight, axes_ref, rates_ref), xp)
     return 0.0 - q, qd_ref - flight.rates
 
 
@@ -206,7 +208,7 @@ def _position_signals(flight: QuadrotorInput, applied: Array) -> JointInput:
 
 
 def _command(
-    gains: CascadeGains, before: FilterState, force: Array, flight: QuadrotorInput, period: float
+    gains: CascadeGains, before: FilterState, force: Array, flight: QuadrotorInput, period: float, xp: Any
 ) -> tuple[FilterState, Axes, Vector, Vector]:
     """Compute the command for the next sample; R_d, w_d and alpha_d of this one."""
     if gains.command == "filtered":  # the difference to the next sample, which is known already
@@ -214,40 +216,40 @@ def _command(
         other = command = second_order(before, force, gains.command_rate, 1.0, period)
     else:  # the difference to the sample before
         other, distance = before, -period
-        now = command = _reference_command(gains, force, flight)
-    axes_ref, rates_ref = _attitude_command(now, flight, 0.0)
-    _, rates_other = _attitude_command(other, flight, distance)
+        now = command = _reference_command(gains, force, flight, xp)
+    axes_ref, rates_ref = _attitude_command(now, flight, 0.0, xp)
+    _, rates_other = _attitude_command(other, flight, distance, xp)
     return command, axes_ref, rates_ref, scaled(1 / distance, minus(rates_other, rates_ref))
 
 
-def _reference_command(gains: CascadeGains, force: Array, flight: QuadrotorInput) -> FilterState:
+def _reference_command(gains: CascadeGains, force: Array, flight: QuadrotorInput, xp: Any) -> FilterState:
     """Return a force at the rate that the reference's jerk takes."""
-    return FilterState(force, times(gains.position.m_bar, flight.jerk_ref))
+    return FilterState(force, times(gains.position.m_bar, flight.jerk_ref, xp))
 
 
-def _attitude_command(command: FilterState, flight: QuadrotorInput, distance: float) -> tuple[Axes, Vector]:
+def _attitude_command(command: FilterState, flight: QuadrotorInput, distance: float, xp: Any) -> tuple[Axes, Vector]:
     """R_d and w_d of a force and its rate, `distance` (s) from this sample."""
     force, rate = components(command.value), components(command.rate)
-    towards = heading(flight.yaw_ref + distance * flight.yaw_rate_ref, flight.yaw_rate_ref)
-    axes = desired_axes(force, towards)
+    towards = heading(flight.yaw_ref + distance * flight.yaw_rate_ref, flight.yaw_rate_ref, xp)
+    axes = desired_axes(force, towards, xp)
     return axes, desired_rates(axes, force, rate, towards)
 
 
 def _attitude_signals(
-    gains: CascadeGains, flight: QuadrotorInput, axes_ref: Axes, rates_ref: Vector, turning: Vector
+    gains: CascadeGains, flight: QuadrotorInput, axes_ref: Axes, rates_ref: Vector, turning: Vector, xp: Any
 ) -> JointInput:
     """Return the attitude law's signals, see the top; `turning` is alpha_d."""
     carried = _carried(flight, axes_ref, rates_ref)
-    q, qd_ref = _attitude_feedback(gains, flight, axes_ref, rates_ref, carried)
+    q, qd_ref = _attitude_feedback(gains, flight, axes_ref, rates_ref, carried, xp)
     turning = _carried(flight, axes_ref, turning)
-    acceleration = joined(minus(turning, cross(components(flight.rates), carried)))
+    acceleration = joined(minus(turning, cross(components(flight.rates), carried)), xp)
     if flight.turning_ref is not None:
         acceleration = acceleration + flight.turning_ref
-    return JointInput(q, flight.rates, np.zeros_like(q), qd_ref, acceleration, flight.torque_applied)
+    return JointInput(q, flight.rates, xp.zeros_like(q), qd_ref, acceleration, flight.torque_applied)
 
 
 def _attitude_feedback(
-    gains: CascadeGains, flight: QuadrotorInput, axes_ref: Axes, rates_ref: Vector, carried: Vector
+    gains: CascadeGains, flight: QuadrotorInput, axes_ref: Axes, rates_ref: Vector, carried: Vector, xp: Any
 ) -> tuple[Array, Array]:
     """q and qd_ref of the attitude law; `carried` is R^T R_d w_d."""
     e = attitude_error(flight.axes, axes_ref)
@@ -256,7 +258,7 @@ def _attitude_feedback(
         rates = components(flight.rates)
         # e_q. = w - R_d^T R w_d
         carried = plus(rates, minus(rates, to_body(axes_ref, to_world(flight.axes, rates_ref))))
-    return joined(scaled(-1.0, e)), joined(carried)
+    return joined(scaled(-1.0, e), xp), joined(carried, xp)
 
 
 def _carried(flight: QuadrotorInput, axes_ref: Axes, a: Vector) -> Vector:
@@ -264,10 +266,10 @@ def _carried(flight: QuadrotorInput, axes_ref: Axes, a: Vector) -> Vector:
     return to_body(flight.axes, to_world(axes_ref, a))
 
 
-def _within_reach(gains: CascadeGains, force: Vector) -> Vector:
+def _within_reach(gains: CascadeGains, force: Vector, xp: Any) -> Vector:
     """Clamp the vertical part of a force, then shorten its horizontal part to the largest tilt."""
     x, y, lift = force
-    lift = np.minimum(np.maximum(lift, gains.lift_min), gains.lift_max)
+    lift = xp.minimum(xp.maximum(lift, gains.lift_min), gains.lift_max)
     allowed = math.tan(math.radians(gains.tilt_max_deg)) * lift
-    shrink = allowed / np.maximum(np.sqrt(x * x + y * y), allowed)
+    shrink = allowed / xp.maximum(root(x * x + y * y, xp), allowed)
     return shrink * x, shrink * y, lift

@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 
+from controllers.laws.namespaces import namespace
 from controllers.laws.tracking import Array, Gain, JointInput, check_positive, desired_acceleration, errors, make_plain
 
 
@@ -30,5 +31,5 @@ def computed_torque(
     gains: ComputedTorqueGains, signals: JointInput, inverse_dynamics: Callable[[Array, Array, Array], Array]
 ) -> Array:
     """One sample of the law at the top; `inverse_dynamics` turns q, qd, qdd (..., n) into torques."""
-    u = desired_acceleration(signals, *errors(signals), gains.k_p, gains.k_d)
+    u = desired_acceleration(signals, *errors(signals), gains.k_p, gains.k_d, namespace(signals.q))
     return inverse_dynamics(signals.q, signals.qd, u)

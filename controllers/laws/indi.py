@@ -14,8 +14,7 @@ from __future__ import annotations
 import dataclasses
 from typing import NamedTuple
 
-import numpy as np
-
+from controllers.laws.namespaces import namespace
 from controllers.laws.second_order import FilterState, check_filter, second_order
 from controllers.laws.tde import TdeGains, inertia_times
 from controllers.laws.tracking import Array, JointInput, desired_acceleration, errors
@@ -48,7 +47,7 @@ class IndiState(NamedTuple):
 
 def indi_init(signals: JointInput, period: float) -> IndiState:
     """Memory before the first sample: as if the reference acceleration and the force had been there for long."""
-    rest = np.zeros_like(signals.qd)
+    rest = namespace(signals.qd).zeros_like(signals.qd)
     return IndiState(
         signals.qd - period * signals.qdd_ref,
         FilterState(signals.qdd_ref, rest),
@@ -58,10 +57,11 @@ def indi_init(signals: JointInput, period: float) -> IndiState:
 
 def indi(gains: IndiGains, state: IndiState, signals: JointInput, period: float) -> tuple[Array, IndiState]:
     """One sample of the law at the top."""
+    xp = namespace(signals.q)
     a = (signals.qd - state.qd) / period
     shape = gains.filter_rate, gains.filter_damping, period
     acceleration = second_order(state.acceleration, a, *shape)
     force = second_order(state.force, signals.tau_applied, *shape)
-    u = desired_acceleration(signals, *errors(signals), gains.k_p, gains.k_d)
-    tau = force.value + inertia_times(gains.m_bar, u - acceleration.value)
+    u = desired_acceleration(signals, *errors(signals), gains.k_p, gains.k_d, xp)
+    tau = force.value + inertia_times(gains.m_bar, u - acceleration.value, xp)
     return tau, IndiState(signals.qd, acceleration, force)

@@ -23,10 +23,9 @@ cable-suspended load", CDC 2013; the integral and the choice of poles are ours.
 from __future__ import annotations
 
 import dataclasses
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import numpy as np
-
+from controllers.laws.namespaces import namespace, root
 from controllers.laws.positional_pid import (
     PositionalPidGains,
     PositionalPidState,
@@ -74,45 +73,46 @@ class LoadState(NamedTuple):
 
 def load_start(gains: LoadGains, signals: JointInput) -> LoadState:
     """Memory before the first sample."""
-    return LoadState(np.zeros_like(signals.q), positional_pid_init(gains, signals))
+    return LoadState(namespace(signals.q).zeros_like(signals.q), positional_pid_init(gains, signals))
 
 
 def load_control(
     gains: LoadGains, state: LoadState, signals: JointInput, cable: Cable, period: float
 ) -> tuple[Array, LoadState]:
     """One sample of the law at the top: F (..., 3) (N), world axes; `signals` are the vehicle's."""
+    xp = namespace(signals.q)
     held = cable.held[..., None]
     resting = signals._replace(  # or the integral of the other law would wind up
-        q_ref=np.where(held, signals.q, signals.q_ref), qd_ref=np.where(held, signals.qd, signals.qd_ref)
+        q_ref=xp.where(held, signals.q, signals.q_ref), qd_ref=xp.where(held, signals.qd, signals.qd_ref)
     )
     alone, alone_memory = positional_pid(gains, state.alone, resting, period)
     r = components(cable.vector)
-    length = np.maximum(np.sqrt(dot(r, r)), SHORTEST)
+    length = xp.maximum(root(dot(r, r), xp), SHORTEST)
     q = scaled(1.0 / length, r)
     rate = components(cable.rate)
     turning = scaled(1.0 / length, minus(rate, scaled(dot(rate, q), q)))
 
-    e, ed, e_vector = _errors(signals, cable, length)
-    integral = np.where(held, np.clip(state.load_integral + (period * gains.load_k_i) * e_vector, -LIMIT, LIMIT), 0.0)
-    square = stiffness(cable)
-    k_1, k_2 = swing_gains(gains.load_k_p, gains.load_k_d, square)
+    e, ed, e_vector = _errors(signals, cable, length, xp)
+    integral = xp.where(held, xp.clip(state.load_integral + (period * gains.load_k_i) * e_vector, -LIMIT, LIMIT), 0.0)
+    square = stiffness(cable, xp)
+    k_1, k_2 = swing_gains(gains.load_k_p, gains.load_k_d, square, xp)
     k_q, k_w = gains.load_k_p + square + k_1, gains.load_k_d + k_2
     share = square / k_q
     feedback = plus(scaled(gains.load_k_p * share, e), scaled(gains.load_k_d * share, ed))
     wanted = plus(components(signals.qdd_ref), feedback)
     wanted = plus(wanted, components(integral))
     wanted = (wanted[0], wanted[1], wanted[2] + GRAVITY)
-    aim = scaled(-1.0 / np.sqrt(np.maximum(dot(wanted, wanted), 1e-6)), wanted)
+    aim = scaled(-1.0 / xp.sqrt(xp.maximum(dot(wanted, wanted), 1e-6)), wanted)
     inertia = gains.vehicle_mass * length
     along = (gains.vehicle_mass + gains.load_mass) * dot(wanted, q) + inertia * dot(turning, turning)
     turned = plus(scaled(k_q, cross(q, cross(q, aim))), scaled(k_w, turning))
-    force = joined(plus(scaled(along, q), scaled(inertia, turned)))
-    return np.where(held, force, alone), LoadState(integral, alone_memory)
+    force = joined(plus(scaled(along, q), scaled(inertia, turned)), xp)
+    return xp.where(held, force, alone), LoadState(integral, alone_memory)
 
 
-def _errors(signals: JointInput, cable: Cable, length: Array) -> tuple[Vector, Vector, Array]:
+def _errors(signals: JointInput, cable: Cable, length: Array, xp: Any) -> tuple[Vector, Vector, Array]:
     """Errors of the load (m, m/s), and the first one as an array."""
     load, speed = signals.q + cable.vector, signals.qd + cable.rate
-    below = joined((0.0 * length, 0.0 * length, length))
+    below = joined((0.0 * length, 0.0 * length, length), xp)
     e = signals.q_ref - below - load
     return components(e), components(signals.qd_ref - speed), e

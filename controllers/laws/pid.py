@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.laws.errors import GainError
+from controllers.laws.namespaces import namespace
 from controllers.laws.tde import TdeGains
 from controllers.laws.tracking import Array, Gain, JointInput, check_positive, errors, make_plain, times
 
@@ -64,8 +65,9 @@ def pid_init(signals: JointInput, period: float) -> PidState:
 
 def pid(gains: PidGains, state: PidState, signals: JointInput, period: float) -> tuple[Array, PidState]:
     """One sample of the law at the top."""
+    xp = namespace(signals.q)
     e, ed = errors(signals)
     slowing = period * signals.qdd_ref - (signals.qd - state.qd)
-    tau = signals.tau_applied + times(gains.proportional, period * ed) + times(gains.integral, period * e)
-    tau = tau + times(gains.derivative, slowing)
+    tau = signals.tau_applied + times(gains.proportional, period * ed, xp) + times(gains.integral, period * e, xp)
+    tau = tau + times(gains.derivative, slowing, xp)
     return tau, PidState(signals.qd)

@@ -12,8 +12,7 @@ from __future__ import annotations
 import dataclasses
 from typing import NamedTuple
 
-import numpy as np
-
+from controllers.laws.namespaces import namespace
 from controllers.laws.tracking import (
     Array,
     Gain,
@@ -61,15 +60,17 @@ class PositionalPidState(NamedTuple):
 
 def positional_pid_init(gains: PositionalPidGains, signals: JointInput) -> PositionalPidState:
     """Memory before the first sample: the force that acts is what the reference acceleration takes."""
-    return PositionalPidState(signals.tau_applied / np.asarray(gains.m_bar, signals.q.dtype) - signals.qdd_ref)
+    m_bar = namespace(signals.q).asarray(gains.m_bar, dtype=signals.q.dtype)
+    return PositionalPidState(signals.tau_applied / m_bar - signals.qdd_ref)
 
 
 def positional_pid(
     gains: PositionalPidGains, state: PositionalPidState, signals: JointInput, period: float
 ) -> tuple[Array, PositionalPidState]:
     """One sample of the law at the top; the integral of sample k acts in sample k, its change from the next one on."""
+    xp = namespace(signals.q)
     e, ed = errors(signals)
-    u = desired_acceleration(signals, e, ed, gains.k_p, gains.k_d) + state.integral
+    u = desired_acceleration(signals, e, ed, gains.k_p, gains.k_d, xp) + state.integral
     limit = gains.integral_limit
-    integral = np.minimum(np.maximum(state.integral + (period * gains.k_i) * e, -limit), limit)
-    return times(gains.m_bar, u), PositionalPidState(integral)
+    integral = xp.minimum(xp.maximum(state.integral + (period * gains.k_i) * e, -limit), limit)
+    return times(gains.m_bar, u, xp), PositionalPidState(integral)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 
 from controllers.laws.computed_torque import ComputedTorqueGains, computed_torque
+from controllers.laws.namespaces import namespace
 from controllers.laws.tracking import Array, Gain, JointInput, check_positive, components, times
 from controllers.laws.vectors import cross, joined
 
@@ -28,9 +29,10 @@ class RigidAttitudeGains(ComputedTorqueGains):
 
 def rigid_attitude(gains: RigidAttitudeGains, signals: JointInput) -> Array:
     """One sample of the law at the top."""
+    xp = namespace(signals.q)
 
     def inverse_dynamics(_q: Array, qd: Array, qdd: Array) -> Array:
-        gyroscopic = cross(components(qd), components(times(gains.inertia, qd)))
-        return times(gains.inertia, qdd) + joined(gyroscopic)
+        gyroscopic = cross(components(qd), components(times(gains.inertia, qd, xp)))
+        return times(gains.inertia, qdd, xp) + joined(gyroscopic, xp)
 
     return computed_torque(gains, signals, inverse_dynamics)

@@ -20,11 +20,12 @@ the reference acceleration, so that any law of the position has it.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from controllers.laws.namespaces import namespace, root
 from controllers.laws.tracking import Array, Gain, components
 from controllers.laws.vectors import dot, joined
 
@@ -46,32 +47,39 @@ class Cable(NamedTuple):
     held: NDArray[np.bool_]
 
 
-def stiffness(cable: Cable) -> Array:
+def stiffness(cable: Cable, xp: Any = np) -> Array:
     """w^2 = g / |r| of a pendulum as long as the cable (...) (1/s^2)."""
     r = components(cable.vector)
-    return GRAVITY / np.maximum(np.sqrt(dot(r, r)), SHORTEST)
+    return GRAVITY / xp.maximum(root(dot(r, r), xp), SHORTEST)
 
 
-def swing_gains(k_p: float, k_d: float, stiffness: Array) -> tuple[Array, Array]:
+def swing_gains(k_p: float | Array, k_d: float | Array, stiffness: Array, xp: Any = np) -> tuple[Array, Array]:
     """K1 (1/s^2) and K2 (1/s) at the top, for a w^2 (...)."""
-    square = np.sqrt(k_p * stiffness)  # W^2
-    frequency = np.sqrt(square)
+    square = xp.sqrt(k_p * stiffness)  # W^2
+    frequency = xp.sqrt(square)
     damping = (0.25 * k_d) * stiffness / (square * frequency)
     return (2.0 + 4.0 * damping * damping) * square - k_p - stiffness, 4.0 * damping * frequency - k_d
 
 
 def swing_term(k_p: Gain, k_d: Gain, cable: Cable, acceleration_ref: Array, jerk_ref: Array) -> Array:
     """du at the top (..., 3) (m/s^2), for the gains of a position law and its reference (..., 3)."""
-    square = stiffness(cable)
+    xp = namespace(cable.vector)
+    square = stiffness(cable, xp)
     acceleration, jerk = components(acceleration_ref), components(jerk_ref)
     r, rate = components(cable.vector), components(cable.rate)
     terms: list[Array] = []
     for axis in range(2):
-        k_1, k_2 = swing_gains(_of(k_p, axis), _of(k_d, axis), square)
+        k_1, k_2 = swing_gains(_of(k_p, axis, square, xp), _of(k_d, axis, square, xp), square, xp)
         term = k_1 * (r[axis] + acceleration[axis] / square) + k_2 * (rate[axis] + jerk[axis] / square)
-        terms.append(np.where(cable.held, term, 0.0 * term))
-    return joined((terms[0], terms[1], 0.0 * terms[0]))
+        terms.append(xp.where(cable.held, term, 0.0 * term))
+    return joined((terms[0], terms[1], 0.0 * terms[0]), xp)
 
 
-def _of(gain: Gain, axis: int) -> float:
-    return gain if isinstance(gain, (int, float)) else gain[axis]
+def _of(gain: Gain, axis: int, like: Array, xp: Any) -> Any:
+    """Return the gain of an axis, in the precision of `like`."""
+    if isinstance(gain, (int, float)):
+        return gain
+    if isinstance(gain, (tuple, list)):
+        return gain[axis]
+    values = xp.asarray(gain, dtype=like.dtype)  # (), (n,), or (..., 1) and (..., n) with a row for each of a batch
+    return values if values.ndim == 0 else values[..., min(axis, values.shape[-1] - 1)]

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from controllers.laws.artde import ArtdeGains, artde, artde_init
 from controllers.laws.atde import AtdeGains, atde, atde_init
 from controllers.laws.errors import GainError
+from controllers.laws.namespaces import namespace
 from controllers.laws.tde import Inertia, TdeGains, as_matrix, check_inertia, tde, tde_init
 from controllers.laws.tracking import Array, JointInput, check_non_negative
 
@@ -70,7 +71,7 @@ class SwitchedTdeGains(TdeGains):
         return {}
 
     def matrices(self, n: int, dtype: Any) -> Matrices:
-        """Return the nominal inertias of `PHASES` as matrices (n, n)."""
+        """Return the nominal inertias of `PHASES` as NumPy's matrices (n, n)."""
         if (n, dtype) not in self._known:
             left, both, right = (as_matrix(m, n).astype(dtype) for m in self._inertias)
             self._known[n, dtype] = left, both, right
@@ -175,24 +176,29 @@ def switched_artde(
     return _switched(artde, gains, state, signals, period, contact, du)
 
 
-def support_phase(gains: SwitchedTdeGains, state: SupportState, contact: Array, period: float) -> SupportState:
+def support_phase(
+    gains: SwitchedTdeGains, state: SupportState, contact: Array, period: float, xp: Any = np
+) -> SupportState:
     """Return the support after one more observation of the contact (..., 2)."""
-    on = (contact > 0.5).astype(contact.dtype)
+    on = xp.asarray(contact > 0.5, dtype=contact.dtype)
     seen = on[..., 0][()] - on[..., 1][()]  # numbers of one robot: ten times as fast as 0-d arrays
     held = (state.held + period) * (seen == state.candidate)
     # arithmetic in place of np.where: exact for these numbers, and much faster for a single robot
     phase = state.phase + (held >= gains.dwell - 0.5 * period) * (seen - state.phase)
     most = period / gains.blend if gains.blend > 0.5 * period else 2.0
-    return SupportState(phase, seen, held, state.blend + np.minimum(np.maximum(phase - state.blend, -most), most))
+    return SupportState(phase, seen, held, state.blend + xp.minimum(xp.maximum(phase - state.blend, -most), most))
 
 
-def nominal_inertia(gains: SwitchedTdeGains, blend: Array, n: int) -> Array:
+def nominal_inertia(gains: SwitchedTdeGains, blend: Array, n: int, xp: Any = np) -> Array:
     """Return m_bar(b) of the equation at the top, (..., n, n)."""
-    left, both, right = gains.matrices(n, blend.dtype)
-    if blend.ndim == 0 and float(blend) in PHASES:  # what follows would give the same bits
-        return (left, both, right)[PHASES.index(float(blend))]
+    if xp is np:
+        left, both, right = gains.matrices(n, blend.dtype)
+        if blend.ndim == 0 and float(blend) in PHASES:  # what follows would give the same bits
+            return (left, both, right)[PHASES.index(float(blend))]
+    else:
+        left, both, right = (xp.asarray(m, dtype=blend.dtype) for m in gains.matrices(n, np.dtype(np.float64)))
     b = blend[..., None, None]
-    return np.maximum(b, 0.0) * left + (1.0 - np.abs(b)) * both + np.maximum(-b, 0.0) * right
+    return xp.maximum(b, 0.0) * left + (1.0 - xp.abs(b)) * both + xp.maximum(-b, 0.0) * right
 
 
 def _switched(
@@ -204,34 +210,37 @@ def _switched(
     contact: Array,
     du: Array | None,
 ) -> tuple[Array, SwitchedState]:
-    support = support_phase(gains, state.support, contact, period)
+    xp = namespace(signals.q)
+    support = support_phase(gains, state.support, contact, period, xp)
     inner, kept = state.law, state.kept
     switches = support.phase != state.support.phase
-    if kept and switches.any():
-        inner, kept = _exchanged(inner, kept, state.support.phase, support.phase, switches)
-    m_bar = nominal_inertia(gains, support.blend, signals.q.shape[-1])
+    if kept and (xp is not np or switches.any()):  # elsewhere truth may be unknown; without a switch, nothing changes
+        inner, kept = _exchanged(inner, kept, state.support.phase, support.phase, switches, xp)
+    m_bar = nominal_inertia(gains, support.blend, signals.q.shape[-1], xp)
     tau, inner = law(gains, inner, signals, period, du, m_bar)
     return tau, SwitchedState(inner, support, kept)
 
 
-def _exchanged(law: Any, kept: Any, left: Array, entered: Array, switches: NDArray[np.bool_]) -> tuple[Any, Any]:
+def _exchanged(
+    law: Any, kept: Any, left: Array, entered: Array, switches: NDArray[np.bool_], xp: Any
+) -> tuple[Any, Any]:
     """Put the adaptive gains of the phase that is left away, and take out those of the one that is entered."""
     own: dict[str, Array] = {}
     stored: dict[str, Array] = {}
-    phases = np.array(PHASES)
+    phases = xp.asarray(PHASES)
     for name, values in kept._asdict().items():
         gain = getattr(law, name.removeprefix(KEPT))
         here = (left[..., None] == phases) & switches[..., None]
-        stored[name] = np.where(here, gain[..., None], values)
-        there = np.where(entered[..., None] == phases, stored[name], np.zeros_like(values)).sum(axis=-1)
-        own[name.removeprefix(KEPT)] = np.where(switches, there, gain)
+        stored[name] = xp.where(here, gain[..., None], values)
+        there = xp.where(entered[..., None] == phases, stored[name], xp.zeros_like(values)).sum(axis=-1)
+        own[name.removeprefix(KEPT)] = xp.where(switches, there, gain)
     return law._replace(**own), kept._replace(**stored)
 
 
 def _on_both_feet(signals: JointInput) -> SupportState:
-    zero = np.zeros(signals.q.shape[:-1], dtype=signals.q.dtype)
+    zero = namespace(signals.q).full(signals.q.shape[:-1], 0.0, dtype=signals.q.dtype)
     return SupportState(zero, zero, zero, zero)
 
 
 def _in_all(gain: Array) -> Array:
-    return np.repeat(gain[..., None], len(PHASES), axis=-1)
+    return namespace(gain).stack([gain] * len(PHASES), axis=-1)

@@ -15,11 +15,12 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from controllers.laws.errors import GainError
+from controllers.laws.namespaces import namespace
 from controllers.laws.tracking import (
     Array,
     Gain,
@@ -93,7 +94,8 @@ def tde_init(signals: JointInput, period: float) -> TdeState:
 
     That leaves feedback alone on top of the force that acts.
     """
-    return TdeState(signals.qd - period * signals.qdd_ref, signals.qdd_ref, np.zeros_like(signals.qd))
+    rest = namespace(signals.qd).zeros_like(signals.qd)
+    return TdeState(signals.qd - period * signals.qdd_ref, signals.qdd_ref, rest)
 
 
 def tde(
@@ -109,17 +111,18 @@ def tde(
     `du` (..., n) is whatever is added to the desired acceleration (rad/s^2); `m_bar` (..., n, n) is taken in place of
     the gains' where it is given.
     """
-    u = desired_acceleration(signals, *errors(signals), gains.k_p, gains.k_d)
+    xp = namespace(signals.q)
+    u = desired_acceleration(signals, *errors(signals), gains.k_p, gains.k_d, xp)
     own = gains.m_bar if m_bar is None else m_bar
-    return time_delay(own, state, signals, u if du is None else u + du, period)
+    return time_delay(own, state, signals, u if du is None else u + du, period, xp)
 
 
 def time_delay(
-    m_bar: Inertia | Array, state: TdeState, signals: JointInput, u: Array, period: float
+    m_bar: Inertia | Array, state: TdeState, signals: JointInput, u: Array, period: float, xp: Any = np
 ) -> tuple[Array, TdeState]:
     """Return the force that makes the acceleration `u` (..., n) if the dynamics are those of one sample ago."""
     a = (signals.qd - state.qd) / period
-    tau = signals.tau_applied + inertia_times(m_bar, u - a)
+    tau = signals.tau_applied + inertia_times(m_bar, u - a, xp)
     return tau, TdeState(signals.qd, u, state.u - a)
 
 
@@ -137,13 +140,13 @@ def as_matrix(m_bar: Inertia, n: int) -> Array:
     return nominal
 
 
-def inertia_times(m_bar: Inertia | Array, v: Array) -> Array:
+def inertia_times(m_bar: Inertia | Array, v: Array, xp: Any = np) -> Array:
     """m_bar v for a scalar, diagonal or full nominal inertia, in the precision of v."""
-    if isinstance(m_bar, (int, float)):
+    if type(m_bar) is float or isinstance(m_bar, (int, float)):
         return m_bar * v
-    matrix = np.asarray(m_bar, dtype=v.dtype)
+    matrix = xp.asarray(m_bar, dtype=v.dtype)
     # column by column: v @ matrix.T rounds differently for one vector and for many
-    return matrix * v if matrix.ndim < 2 else np.matmul(matrix, v[..., None])[..., 0]
+    return matrix * v if matrix.ndim < 2 else xp.matmul(matrix, v[..., None])[..., 0]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -186,5 +189,7 @@ def constant_gain_tde(
     gains: ConstantGains, state: TdeState, signals: JointInput, period: float, du: Array | None = None
 ) -> tuple[Array, TdeState]:
     """TDE with du = alpha c s / sqrt(|s|^2 + eps)."""
-    robust = (gains.alpha * gains.c) * smooth_sign(sliding_variable(*errors(signals), gains.k_p, gains.k_d), gains.eps)
+    xp = namespace(signals.q)
+    s = sliding_variable(*errors(signals), gains.k_p, gains.k_d, xp)
+    robust = (gains.alpha * gains.c) * smooth_sign(s, gains.eps, xp)
     return tde(gains, state, signals, period, robust if du is None else robust + du)

@@ -53,36 +53,35 @@ def errors(signals: JointInput) -> tuple[Array, Array]:
     return signals.q_ref - signals.q, signals.qd_ref - signals.qd
 
 
-def desired_acceleration(signals: JointInput, e: Array, ed: Array, k_p: Gain, k_d: Gain) -> Array:
+def desired_acceleration(signals: JointInput, e: Array, ed: Array, k_p: Gain, k_d: Gain, xp: Any = np) -> Array:
     """u_0 = qdd_ref + Kd ed + Kp e (Dantu 2023, equation 2.5c)."""
-    return signals.qdd_ref + times(k_d, ed) + times(k_p, e)
+    return signals.qdd_ref + times(k_d, ed, xp) + times(k_p, e, xp)
 
 
-def sliding_variable(e: Array, ed: Array, k_p: Gain, k_d: Gain) -> Array:
+def sliding_variable(e: Array, ed: Array, k_p: Gain, k_d: Gain, xp: Any = np) -> Array:
     """s = B^T P xi with A^T P + P A = -I for diagonal gains: s = e / (2 Kp) + ed (1 + Kp) / (2 Kp Kd)."""
-    p12, p22 = sliding_weights(k_p, k_d)
-    return times(p12, e) + times(p22, ed)
+    p12, p22 = sliding_weights(k_p, k_d, xp)
+    return times(p12, e, xp) + times(p22, ed, xp)
 
 
-def sliding_weights(k_p: Gain, k_d: Gain) -> tuple[Gain, Gain]:
+def sliding_weights(k_p: Gain, k_d: Gain, xp: Any = np) -> tuple[Any, Any]:
     """p12 and p22 of the Lyapunov solution P for Q = I, joint by joint."""
-    if isinstance(k_p, (int, float)) and isinstance(k_d, (int, float)):
-        return 1 / (2 * k_p), (1 + k_p) / (2 * k_p * k_d)
-    p, d = np.broadcast_arrays(np.asarray(k_p, dtype=np.float64), np.asarray(k_d, dtype=np.float64))
-    return tuple((1 / (2 * p)).tolist()), tuple(((1 + p) / (2 * p * d)).tolist())
+    p = k_p if isinstance(k_p, (int, float)) else xp.asarray(k_p)
+    d = k_d if isinstance(k_d, (int, float)) else xp.asarray(k_d)
+    return 1 / (2 * p), (1 + p) / (2 * p * d)
 
 
-def smooth_sign(s: Array, eps: float) -> Array:
+def smooth_sign(s: Array, eps: float, xp: Any = np) -> Array:
     """sig(s, eps) = s / sqrt(|s|^2 + eps) (Dantu 2023, equation 2.19), the whole vector by its one norm."""
-    return s / np.sqrt(inner(s, s) + eps)[..., None]
+    return s / xp.sqrt(inner(s, s, xp) + eps)[..., None]
 
 
-def inner(v: Array, w: Array) -> Array:
+def inner(v: Array, w: Array, xp: Any = np) -> Array:
     """v^T w over the last axis."""
     if v.shape[-1] == 3:  # faster by components, and the same in any memory order: vecdot rounds by strides
         (a, b, c), (x, y, z) = components(v), components(w)
         return a * x + b * y + c * z
-    return np.vecdot(v, w)
+    return xp.vecdot(v, w)
 
 
 def components(v: Array) -> tuple[Array, Array, Array]:
@@ -95,11 +94,11 @@ def signed_step(size: Array, up: NDArray[np.bool_]) -> Array:
     return 2.0 * (size * up) - size
 
 
-def times(gain: Gain, v: Array) -> Array:
+def times(gain: Gain, v: Array, xp: Any = np) -> Array:
     """gain v, in the precision of v."""
-    if isinstance(gain, (int, float)):
+    if type(gain) is float or isinstance(gain, (int, float)):
         return gain * v
-    return np.asarray(gain, dtype=v.dtype) * v
+    return xp.asarray(gain, dtype=v.dtype) * v
 
 
 def check_positive(field: str, gain: Gain) -> None:

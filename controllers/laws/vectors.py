@@ -6,7 +6,7 @@ stacked 3 x 3 matrices do neither. A rotation is its three columns: the body's a
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -52,7 +52,9 @@ def to_world(axes: Axes, a: Vector) -> Vector:
     return plus(plus(scaled(a[0], axes[0]), scaled(a[1], axes[1])), scaled(a[2], axes[2]))
 
 
-def joined(a: tuple[Array, ...]) -> Array:
+def joined(a: tuple[Array, ...], xp: Any = np) -> Array:
     """Components as one array (..., n), each component contiguous."""
+    if xp is not np:
+        return xp.stack(a, axis=-1)
     columns = np.array(a)
     return columns.transpose((*range(1, columns.ndim), 0))

@@ -224,7 +224,7 @@ def test_what_the_attitude_law_sees():
     gains, now, rng = tde_gains(), flight(4), np.random.default_rng(13)
     memory = cascade_init(TDE, TDE, gains, now, PERIOD)
     memory = memory._replace(command=memory.command._replace(rate=rng.normal(scale=20.0, size=(4, 3))))
-    axes_ref, rates_ref = cascade_module._attitude_command(memory.command, now, 0.0)
+    axes_ref, rates_ref = cascade_module._attitude_command(memory.command, now, 0.0, np)
     _, after = cascade(TDE, spy(TDE, seen), gains, memory, now, PERIOD)
     assert after.axes_ref is not memory.axes_ref
     np.testing.assert_array_equal(matrix_of(after.axes_ref), matrix_of(axes_ref))
@@ -236,7 +236,7 @@ def test_what_the_attitude_law_sees():
     asked = signals.qdd_ref - np.asarray(now.turning_ref)  # less what a residual adds
     turning = np.einsum("...ji,...j", across, asked + np.cross(now.rates, carried))
     later = now._replace(yaw_ref=now.yaw_ref + PERIOD * now.yaw_rate_ref)
-    _, rates_after = cascade_module._attitude_command(after.command, later, 0.0)
+    _, rates_after = cascade_module._attitude_command(after.command, later, 0.0, np)
     np.testing.assert_allclose(turning, (joined(rates_after) - joined(rates_ref)) / PERIOD, atol=1e-10)
     np.testing.assert_array_equal(signals.tau_applied, now.torque_applied)
 
@@ -302,7 +302,7 @@ def test_the_printed_error_is_that_of_the_thesis():
     now = flight(axes=axes_of(actual), rates=np.array([0.3, -0.2, 0.1]))
     memory = cascade_init(TDE, TDE, tde_gains(), now, PERIOD)
     memory = memory._replace(command=memory.command._replace(rate=np.array([5.0, -3.0, 1.0])))
-    axes_ref, rates_ref = cascade_module._attitude_command(memory.command, now, 0.0)
+    axes_ref, rates_ref = cascade_module._attitude_command(memory.command, now, 0.0, np)
     desired = matrix_of(axes_ref)
     seen: list[JointInput] = []
     for sign in ("desired", "printed"):

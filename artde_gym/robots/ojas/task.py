@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import pickle
 import weakref
 from collections.abc import Callable, Mapping
 from typing import Any, Literal, Self, TypeVar, get_args
@@ -13,9 +14,11 @@ import numpy as np
 from artde_gym.arguments import check_bool, check_choice, steps_per_period
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
+from artde_gym.disturbances.actuation import Actuation
 from artde_gym.disturbances.friction import KIND as JOINT_FRICTION
 from artde_gym.disturbances.friction import check_friction
 from artde_gym.disturbances.ground import GrfPulses
+from artde_gym.disturbances.sensing import Sensing
 from artde_gym.errors import DisturbanceError
 from artde_gym.layout import Field, Layout
 from artde_gym.metrics_spec import EffortSignal, MetricsSpec, TrackedSignal
@@ -265,6 +268,15 @@ def settling(sampled: Mapping[str, Any]) -> int:
         if sampled.keys().isdisjoint(("payload", "friction", "mass_scale", "mass_distribution", "contact"))
         else SETTLE_STEPS
     )
+
+
+LATER = ("push", "grf_pulse", *Actuation.KINDS, *Sensing.KINDS)
+"""Disturbances that do not act before the first control period."""
+
+
+def settled_by(sampled: Mapping[str, Any]) -> bytes:
+    """Return a key of all sampled disturbances that may act while the robot settles; unknown ones are among them."""
+    return pickle.dumps(sorted((kind, value) for kind, value in sampled.items() if kind not in LATER))
 
 
 def reward_terms(
