@@ -65,10 +65,11 @@ def play(
         env_kwargs=environment_kwargs(env_kwargs, engine),
         gains=json_object("--gains", gains),
     )
+    game = Game(plan)  # first: what it refuses, no page should be opened for
     server = Server(host, port)
     try:
         _announce(server, browser)
-        run(Game(plan), server)
+        run(game, server)
     except KeyboardInterrupt:
         pass
     finally:
@@ -76,7 +77,7 @@ def play(
 
 
 def _announce(server: Server, browser: bool) -> None:
-    """Open a browser or say what to open; the page says that the simulation is being prepared."""
+    """Open a browser or say what to open."""
     console = terminal()
     console.print(f"Live play: {server.address}", soft_wrap=True, highlight=False, markup=False)
     if not server.loopback:
