@@ -6,7 +6,6 @@ import difflib
 from collections.abc import Collection
 from typing import Self
 
-
 LONGEST = 300
 """Characters of a value in an error; more, such as a matrix, would hide what is allowed."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-
 LONGEST = 100
 """Characters of a value in an error; those of a matrix would hide what is allowed."""
 

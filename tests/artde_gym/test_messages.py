@@ -32,7 +32,7 @@ def test_a_value_is_shortened_and_the_rule_follows() -> None:
 
 
 def test_an_environment_of_others_is_no_attribute_error() -> None:
-    with pytest.raises(OptionError, match="environment to be controlled is .*CartPole.*; allowed: one of artde_gym"):
+    with pytest.raises(OptionError, match=r"environment to be controlled is .*CartPole.*; allowed: one of artde_gym"):
         controllers.make("tde", gym.make("CartPole-v1"))
 
 
