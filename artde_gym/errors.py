@@ -6,6 +6,9 @@ import difflib
 from collections.abc import Collection
 from typing import Self
 
+LONGEST = 300
+"""Characters of a value in an error; more, such as a matrix, would hide what is allowed."""
+
 
 class ArtdeGymError(ValueError):
     """`field` has a `value` that is not `allowed`; or it has a `problem`, and `allowed` says what to do.
@@ -20,8 +23,14 @@ class ArtdeGymError(ValueError):
 
     def __str__(self) -> str:
         if self.problem:
-            return f"{self.field} {self.value!r} {self.problem}; {self.allowed}"
-        return f"{self.field} is {self.value!r}; allowed: {self.allowed}"
+            return f"{self.field} {self.shown} {self.problem}; {self.allowed}"
+        return f"{self.field} is {self.shown}; allowed: {self.allowed}"
+
+    @property
+    def shown(self) -> str:
+        """The value as text, shortened."""
+        text = repr(self.value)
+        return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
 
     def within(self, place: str) -> Self:
         """Return the same error with a place beside the field."""
@@ -50,14 +59,14 @@ class UnknownArgumentError(OptionError, TypeError):
     def __str__(self) -> str:
         if not self.allowed:
             return self.field
-        return f"{self.field} got an unexpected keyword argument {self.value!r}; allowed: {self.allowed}"
+        return f"{self.field} got an unexpected keyword argument {self.shown}; allowed: {self.allowed}"
 
 
 class MissingDependencyError(OptionError):
     """An argument that needs a package that is not installed; `allowed` says what to do."""
 
     def __str__(self) -> str:
-        return f"{self.field} {self.value!r} is not available: {self.allowed}"
+        return f"{self.field} {self.shown} is not available: {self.allowed}"
 
 
 class ActionError(ArtdeGymError):

@@ -244,7 +244,8 @@ def _plain(training: Training) -> dict[str, Any]:
     try:
         return json.loads(json.dumps(dataclasses.asdict(training)))
     except (TypeError, ValueError) as error:
-        raise TrainingError("training", training, f"values that JSON can write ({error})") from error
+        given = {"env_kwargs": training.env_kwargs, "options": training.options}
+        raise TrainingError("training", given, f"values that JSON can write ({error})") from error
 
 
 def _refuse_others(folder: Path, configuration: dict[str, Any], free: set[str]) -> None:

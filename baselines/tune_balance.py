@@ -40,8 +40,13 @@ def tune(training: Training, out: str | Path, on_progress: Callable[[Progress], 
     Raises:
         TrainingError: if `out` holds a run of another configuration, the robot has no such law, or the engine no batch.
     """
-    if training.config.action_mode not in agent_of(training.config.robot).balanced:
-        raise TrainingError("config", training.config, "the biped's synergies, of which the law has gains")
+    config = training.config
+    balanced = sorted(agent_of(config.robot).balanced)
+    if not balanced:
+        problem = f"has no law of the robot {config.robot!r} whose gains it could tune"
+        raise TrainingError("algo", training.algo, "choose another one", problem)
+    if config.action_mode not in balanced:
+        raise TrainingError("action_mode", config.action_mode, f"{', '.join(balanced)}, of which the law has gains")
     run = Run(training, Path(out), on_progress)
     if not run.batched:
         raise TrainingError("engine", environment_kwargs(training).get("engine"), repr(run.task.batch_engine))

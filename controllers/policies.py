@@ -32,13 +32,21 @@ class ControlInterface(NamedTuple):
 
     @classmethod
     def of(cls, env: Any) -> ControlInterface:
-        """Read from a Gymnasium environment, wrapped or not, or from a vector of equal ones (Gymnasium's or SB3's)."""
+        """Read from a Gymnasium environment, wrapped or not, or from a vector of equal ones (Gymnasium's or SB3's).
+
+        Raises:
+            OptionError: for an environment that no robot of this project, or of a plug-in, drives.
+        """
 
         def read(name: str) -> Any:
             return env.get_attr(name)[0] if hasattr(env, "num_envs") else getattr(env.unwrapped, name)
 
         names = ("robot_name", "observation_layout", "action_layout", "control_period", "nominal_robot")
-        return cls(*(read(name) for name in names))
+        try:
+            return cls(*(read(name) for name in names))
+        except AttributeError as error:
+            allowed = f"one of artde_gym or of a plug-in ({error})"
+            raise OptionError("environment to be controlled", env, allowed) from error
 
 
 class Policy(abc.ABC):

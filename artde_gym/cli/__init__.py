@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
+import warnings
 from typing import Annotated
 
 import gymnasium as gym
@@ -54,11 +56,29 @@ app.command()(design.design)
 
 def main() -> None:
     """Run the command; user errors are reported in one line on standard error with exit code 2."""
+    _tell_warnings()
     try:
         app()
     except (ArtdeGymError, GainError, gym.error.Error, OSError) as error:  # OSError: a full disk, for example
         typer.echo(f"artde-gym: {error}", err=True)
         sys.exit(2)
+
+
+def _tell_warnings() -> None:
+    """Print each warning once, as a line in words.
+
+    Workers build what this process has built before, and print none of those that this tells.
+    """
+    os.environ.setdefault("PYTHONWARNINGS", "ignore::UserWarning")
+    told: set[str] = set()
+
+    def show(message: Warning | str, *_: object, **_others: object) -> None:
+        text = " ".join(str(message).split())
+        if text not in told:
+            told.add(text)
+            typer.echo(f"artde-gym: warning: {text}", err=True)
+
+    warnings.showwarning = show
 
 
 @app.callback(invoke_without_command=True)

@@ -69,10 +69,10 @@ def play(
         env_kwargs=environment_kwargs(env_kwargs, engine),
         gains=json_object("--gains", gains),
     )
+    game = Game(plan)  # first: what it refuses, no page should be opened for
     server = Server(host, port)
     try:
         _announce(server, browser)
-        game = Game(plan)
         with _until_interrupted() as going:
             run(game, server, going)
     except KeyboardInterrupt:
@@ -104,7 +104,7 @@ def _until_interrupted() -> Iterator[Callable[[], bool]]:
 
 
 def _announce(server: Server, browser: bool) -> None:
-    """Open a browser or say what to open; the page says that the simulation is being prepared."""
+    """Open a browser or say what to open."""
     console = terminal()
     console.print(f"Live play: {server.address}", soft_wrap=True, highlight=False, markup=False)
     if not server.loopback:

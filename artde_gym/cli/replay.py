@@ -50,7 +50,9 @@ def replay(
     from artde_gym.evaluation.replay import replay_folder
 
     console = terminal()
-    with Progress(words("description"), TimeElapsedColumn(), console=console, transient=True) as bar:
+    with Progress(
+        words("description"), TimeElapsedColumn(), console=console, transient=True, disable=not console.is_interactive
+    ) as bar:
         shown = bar.add_task("")
 
         def told(name: str, time: float) -> None:

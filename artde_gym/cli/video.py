@@ -48,7 +48,7 @@ def video(
 
     console = terminal()
     columns_shown = (words("description"), TimeElapsedColumn())
-    with Progress(*columns_shown, console=console, transient=True) as bar:
+    with Progress(*columns_shown, console=console, transient=True, disable=not console.is_interactive) as bar:
         shown = bar.add_task("")
         file = make_video(
             names("--controllers", controllers),

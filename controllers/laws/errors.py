@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+LONGEST = 100
+"""Characters of a value in an error; those of a matrix would hide what is allowed."""
+
 
 class GainError(ValueError):
     """Gain `field` has a `value` that is not `allowed`."""
@@ -11,4 +14,6 @@ class GainError(ValueError):
         self.field, self.value, self.allowed = field, value, allowed
 
     def __str__(self) -> str:
-        return f"gain {self.field} is {self.value!r}; allowed: {self.allowed}"
+        text = repr(self.value)
+        shown = text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
+        return f"gain {self.field} is {shown}; allowed: {self.allowed}"
