@@ -19,9 +19,9 @@ from artde_gym.files import write_atomically
 from artde_gym.kit import ROBOTS
 from artde_gym.palette import STYLES
 from artde_gym.report.chart import Axis, Chart
-from controllers.design import DELAYED, Design, designed
+from controllers.design import DELAYED, Design, delayed, designed
 from controllers.design import design as work_out
-from controllers.support_design import SWITCHED, SupportDesign, derived_gains, design_supports
+from controllers.support_design import SWITCHED, SupportDesign, derived_gains, design_supports, switched
 
 NAMES = {ROBOTS[robot].title: robot for robot in designed() if robot in ROBOTS}
 """Robots by title."""
@@ -29,7 +29,7 @@ NAMES = {ROBOTS[robot].title: robot for robot in designed() if robot in ROBOTS}
 
 def design(
     robot: Annotated[str, typer.Option(help=f"{' or '.join(NAMES)}.")] = "biped",
-    law: Annotated[str, typer.Option(help=f"{', '.join((*DELAYED, *SWITCHED))}.")] = "tde",
+    law: Annotated[str, typer.Option(help=f"{', '.join((*DELAYED, *SWITCHED))}, or your own.")] = "tde",
     preset: Annotated[str | None, typer.Option(help="Preset of the law's gains; see `list controllers`.")] = None,
     gains: Annotated[str | None, typer.Option(help='JSON; override gains of the preset, e.g. {"m_bar": 0.08}.')] = None,
     period: Annotated[float | None, typer.Option(help="Control period L (s). Default: the robot's.")] = None,
@@ -58,9 +58,9 @@ def design(
         check_number("period", period, 1e-6, 10.0, "1e-6 to 10 s")
     walk = {"actuator_inertia": actuator_inertia, "speed": speed, "step_duration": step_duration}
     given = {name: value for name, value in walk.items() if value is not None} | json_object("--motion", motion)
-    if law in SWITCHED:
+    if law in switched():
         if figure is not None:
-            raise OptionError("figure", str(figure), f"a law with one m_bar: {', '.join(DELAYED)}")
+            raise OptionError("figure", str(figure), f"a law with one m_bar: {', '.join(delayed())}")
         chosen = json_object("gains", gains)
         _show_supports(robot, law, design_supports(NAMES[robot], law, preset, cap, gains=chosen, **given), as_json)
         return
