@@ -7,14 +7,13 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich import box
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
 from artde_gym.benchmark import SECTIONS, Section, measure
 from artde_gym.cli.arguments import names
 from artde_gym.cli.display import terminal
+from artde_gym.evaluation.fitting_table import FittingTable
 from artde_gym.files import write_atomically
 
 
@@ -49,7 +48,7 @@ def benchmark(
 def _print(section: Section, console: Console) -> None:
     from artde_gym.benchmark.page import written
 
-    table = Table("what", title=section.title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD)
+    table = FittingTable("what", title=section.title, title_style="bold")
     table.add_column("value", justify="right")
     table.add_column("unit")
     table.add_column("target")

@@ -8,13 +8,13 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from rich import box
 from rich.console import Console
-from rich.table import Table
 
 from artde_gym.arguments import check_number
 from artde_gym.cli.arguments import json_object
+from artde_gym.cli.display import terminal
 from artde_gym.errors import OptionError
+from artde_gym.evaluation.fitting_table import FittingTable
 from artde_gym.files import write_atomically
 from artde_gym.kit import ROBOTS
 from artde_gym.palette import STYLES
@@ -75,7 +75,7 @@ def design(
         print(json.dumps({"robot": robot, "law": law, "loops": [one.to_dict() for one in found]}, indent=2))
         return
     for one in found:
-        _print(one, Console())
+        _print(one, terminal())
 
 
 def draw(one: Design) -> str:
@@ -100,7 +100,7 @@ def _print(one: Design, console: Console) -> None:
     loop = one.loop
     newton = "N" if loop.unit == "kg" else "Nm"
     length = "m" if loop.unit == "kg" else "rad"
-    table = Table("joint", box=box.SIMPLE_HEAD, title_justify="left")
+    table = FittingTable("joint")
     table.title = f"{loop.name}, L = {1e3 * one.period:g} ms ({loop.unit}, {newton}/{length}, {newton} s/{length})"
     for title in ("m_bar", "valid below", "K_d m_bar/L", "m_bar/L"):
         table.add_column(title, justify="right")
@@ -122,7 +122,7 @@ def _show_supports(robot: str, law: str, found: list[SupportDesign], as_json: bo
         phases = [one.to_dict() for one in found]
         print(json.dumps({"robot": robot, "law": law, "phases": phases, "gains": derived_gains(found)}, indent=2))
         return
-    table = Table("support", box=box.SIMPLE_HEAD)
+    table = FittingTable("support")
     for title in ("time", "blocked", "m_bar below", "eigenvalues of A m_bar", "in any phase", "of the derived m_bar"):
         table.add_column(title, justify="right")
     for one in found:
@@ -130,9 +130,10 @@ def _show_supports(robot: str, law: str, found: list[SupportDesign], as_json: bo
         derived = "" if one.derived is None else _range(one.derived)
         table.add_row(one.phase.name, f"{100 * one.phase.share:.1f} %", f"{one.blocked} of {len(one.phase.joints)}",
                       f"{one.limit:.4g}", f"{low:.3g} to {high:.3g}", f"{one.largest:.3g}", derived)  # fmt: skip
-    Console().print(table)
+    console = terminal()
+    console.print(table)
     verdict = "valid in every phase" if all(one.valid for one in found) else "OUTSIDE: time-delay estimation diverges"
-    print(f"Chosen nominal inertias, eigenvalues below 2: {verdict}. --json prints what is derived.")
+    console.print(f"Chosen nominal inertias, eigenvalues below 2: {verdict}. --json prints what is derived.")
 
 
 def _range(matrix: np.ndarray) -> str:

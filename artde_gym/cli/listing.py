@@ -7,15 +7,14 @@ from collections.abc import Callable
 from typing import Annotated, Any
 
 import typer
-from rich import box
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
 from artde_gym.cli.arguments import names
 from artde_gym.cli.catalog import TOPICS, Entries
 from artde_gym.cli.display import terminal
 from artde_gym.errors import UnknownNameError, suggest_names
+from artde_gym.evaluation.fitting_table import FittingTable
 
 Shown = Callable[[Entries, Console], None]
 
@@ -53,10 +52,8 @@ def _chosen(entries: Entries, topic: str, wanted: list[str]) -> Entries:
     return [entry for entry in entries if entry["name"] in wanted]
 
 
-def _table(title: str, *columns: str) -> Table:
-    table = Table(*columns, title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, padding=(0, 1))
-    table.columns[0].overflow = "fold"
-    return table
+def _table(title: str, *columns: str) -> FittingTable:
+    return FittingTable(*columns, title=title, title_style="bold")
 
 
 def _environments(entries: Entries, console: Console) -> None:

@@ -7,14 +7,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import pandas as pd
-from rich import box
 from rich.console import Console, Group, RenderableType
 from rich.padding import Padding
-from rich.table import Table
 from rich.text import Text
 
 from artde_gym.evaluation import statistics, thesis
 from artde_gym.evaluation.environments import metrics_spec_of
+from artde_gym.evaluation.fitting_table import FittingTable
 from artde_gym.evaluation.registered import METRICS
 from artde_gym.evaluation.result import Result
 from artde_gym.metrics_spec import MetricsSpec
@@ -101,7 +100,7 @@ class _Tables:
             parts += self._metric(scenario, reference, metric, what, axes)
         return Group(*parts, *self._events(scenario, tracking))
 
-    def _falls(self, scenario: str, reference: str | None) -> Table:
+    def _falls(self, scenario: str, reference: str | None) -> FittingTable:
         table = _table("controller", "falls", "rate", "95 %", "time to fall (s)", "thesis (s)", title="Falls")
         for controller in self._controllers:
             count, rate = self._result.falls(scenario, controller)
@@ -116,15 +115,17 @@ class _Tables:
             )
         return table
 
-    def _metric(self, scenario: str, reference: str | None, metric: str, title: str, axes: list[str]) -> list[Table]:
+    def _metric(
+        self, scenario: str, reference: str | None, metric: str, title: str, axes: list[str]
+    ) -> list[FittingTable]:
         """Build two rows per axis: ours, and the thesis'. Few controllers and their comparisons share one table."""
         digits = digits_of(metric)
 
         def column(axis: str) -> str:
             return metric if axis == ALL else f"{metric}_{axis}"
 
-        def table(shown: list[str], compared: list[str]) -> Table:
-            part = _table("axis", "", title=title)
+        def table(shown: list[str], compared: list[str]) -> FittingTable:
+            part = _table("axis", "", title=title, keys=2)
             part.collapse_padding = len(shown) > WIDE
             for name in (*shown, *(f"{REFERENCE} vs {rival} (%)" for rival in compared)):
                 part.add_column(name, justify="right")
@@ -136,9 +137,9 @@ class _Tables:
                 _add_pair(part, axis, ours, theirs)
             return part
 
-        def comparison() -> Table:
+        def comparison() -> FittingTable:
             """Build a table with the axes as columns, for few axes."""
-            part = _table(f"{REFERENCE} vs (%)", "", title=title)
+            part = _table(f"{REFERENCE} vs (%)", "", title=title, keys=2)
             for axis in axes:
                 part.add_column(axis, justify="right")
             for rival in self._rivals:
@@ -153,10 +154,10 @@ class _Tables:
         pairs = [self._rivals[i : i + TOGETHER] for i in range(0, len(self._rivals), TOGETHER)]
         return [table(self._controllers, []), *(table([], pair) for pair in pairs)]
 
-    def _events(self, scenario: str, tracking: MetricsSpec) -> list[Table]:
+    def _events(self, scenario: str, tracking: MetricsSpec) -> list[FittingTable]:
         """Build the table of peaks and recoveries after disturbances; a missing recovery counts as the longest."""
         unit, (text, digits) = tracking.errors[0].unit, UNITS[tracking.errors[0].unit]
-        table = _table("after", "", title="after disturbances")
+        table = _table("after", "", title="after disturbances", keys=2)
         table.collapse_padding = len(self._controllers) > WIDE
         for controller in self._controllers:
             table.add_column(controller, justify="right")
@@ -208,11 +209,11 @@ def _part(start: float, end: float) -> str:
     return f"{start:g} to {end:g} s" if math.isfinite(end) else f"from {start:g} s"
 
 
-def _table(*columns: str, title: str) -> Table:
-    return Table(*columns, title=title, title_justify="left", title_style="italic", box=box.SIMPLE_HEAD, padding=(0, 1))
+def _table(*columns: str, title: str, keys: int = 1) -> FittingTable:
+    return FittingTable(*columns, keys=keys, title=title, title_style="italic")
 
 
-def _add_pair(table: Table, name: str, ours: list[str], theirs: list[str]) -> None:
+def _add_pair(table: FittingTable, name: str, ours: list[str], theirs: list[str]) -> None:
     table.add_row(name, "ours", *ours)
     if any(theirs):
         table.add_row("", "thesis", *theirs, style="dim")

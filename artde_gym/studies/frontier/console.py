@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from rich import box
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
+from artde_gym.evaluation.fitting_table import FittingTable
 from artde_gym.studies.frontier.half import half_text
 from artde_gym.studies.frontier.result import Frontier, value_text
 
@@ -40,10 +39,10 @@ def print_frontier(found: Frontier, console: Console) -> None:
         console.print(f"Written to {found.folder}")
 
 
-def _table(found: Frontier) -> Table:
+def _table(found: Frontier) -> FittingTable:
     unit = "" if found.axis.unit == "1" else f" ({found.axis.unit})"
-    columns = ("controller", f"frontier{unit}", "survival (95 %)", f"fails at{unit}", "survival (95 %)")
-    table = Table(*columns, box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
+    columns = ("controller", f"frontier{unit}", "survival (95 %)", f"fails at{unit}", "survival there")
+    table = FittingTable(*columns, pad_edge=False)
     easy, hard = ("low", "high") if found.axis.harder == "larger" else ("high", "low")
     for row in found.table.to_dict(orient="records"):
         fails = f"{row[hard]:g}" if math.isfinite(row[hard]) else "-"
@@ -56,7 +55,7 @@ def _print_grid(found: Frontier, console: Console) -> None:
     assert found.half is not None
     unit = "" if found.axis.unit == "1" else f" ({found.axis.unit})"
     names = found.table["controller"].tolist()
-    falls = Table(f"falls at{unit}", *names, box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
+    falls = FittingTable(f"falls at{unit}", *names, pad_edge=False)
     for value, level in found.levels.groupby("value"):
         rows = {row["controller"]: row for row in level.to_dict(orient="records")}
         falls.add_row(f"{value:g}", *(_falls(rows.get(name)) for name in names))

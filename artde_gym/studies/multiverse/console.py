@@ -6,12 +6,11 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from rich import box
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
 from artde_gym.errors import MissingDependencyError
+from artde_gym.evaluation.fitting_table import FittingTable
 from artde_gym.evaluation.statistics import Estimate
 from artde_gym.studies.multiverse.claims import OUTCOMES
 from artde_gym.studies.multiverse.deciding import Deciding
@@ -50,17 +49,16 @@ def p_text(p_value: float) -> str:
     return "< 0.001" if p_value < 0.001 else f"{p_value:.3f}"
 
 
-def _survival(found: Multiverse) -> Table:
-    table = Table("controller", "worlds", "without a fall, % (95 %)", box=box.SIMPLE_HEAD, pad_edge=False)
+def _survival(found: Multiverse) -> FittingTable:
+    table = FittingTable("controller", "worlds", "without a fall, % (95 %)", pad_edge=False)
     for name in found.controllers:
         share = found.survival(name)
         table.add_row(Text(name), str(share.n), share_text(share))
     return table
 
 
-def _claims(found: Multiverse) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("claim", overflow="fold")
+def _claims(found: Multiverse) -> FittingTable:
+    table = FittingTable("claim", pad_edge=False)
     for title in ("worlds", *(f"{outcome}, % (95 %)" for outcome in OUTCOMES), "p"):
         table.add_column(title, justify="right")
     for verdict in found.verdicts:

@@ -6,12 +6,11 @@ import json
 import math
 from collections.abc import Mapping
 
-from rich import box
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
 from artde_gym.evaluation import statistics
+from artde_gym.evaluation.fitting_table import FittingTable
 from artde_gym.studies.tune.tuning import TUNED, Tuning
 
 
@@ -35,10 +34,12 @@ def print_tuning(found: Tuning, console: Console) -> None:
         console.print(f"Written to {found.folder}")
 
 
-def _comparison(found: Tuning, scenario: str) -> Table:
+def _comparison(found: Tuning, scenario: str) -> FittingTable:
     result = found.held_out
     assert result is not None
-    table = _table("controller", "preset", "falls", "tuned", "falls", "change (%)")
+    table = FittingTable(
+        "controller", "preset", "falls (preset)", "tuned", "falls (tuned)", "change (%)", pad_edge=False
+    )
     for name in found.best:
         cells: list[str] = []
         for label in (name, name + TUNED):
@@ -60,14 +61,10 @@ def _estimate(value: statistics.Estimate) -> str:
     return f"{value.value:.3g}{span}"
 
 
-def _gains(found: Tuning) -> Table:
-    table = _table("controller", "tuned gains (preset)")
+def _gains(found: Tuning) -> FittingTable:
+    table = FittingTable("controller", "tuned gains (preset)", pad_edge=False)
     first = {row["controller"]: row for row in found.trials.to_dict(orient="records") if row["trial"] == 0}
     for name, gains in found.best.items():
         preset: Mapping[str, float] = json.loads(first[name]["gains"])
         table.add_row(name, ", ".join(f"{gain} {value:g} ({preset[gain]:g})" for gain, value in gains.items()))
     return table
-
-
-def _table(*columns: str) -> Table:
-    return Table(*columns, box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
