@@ -1,17 +1,24 @@
 """Control laws and policies for artde_gym's environments.
 
 `make("artde", env)` gives a policy with Stable-Baselines3's `predict`; the laws themselves are pure functions in
-`controllers.laws`.
+`controllers.laws`. `register_law` makes a law of your own, a `LawSpec`, a controller.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from artde_gym.lazy import lazy
 from artde_gym.registration import make_controller
 from controllers.laws.errors import GainError
 
-__all__ = ["GainError", "make"]
+if TYPE_CHECKING:
+    from controllers.law_spec import LawSpec
+    from controllers.registration import register_law
+
+__all__ = ["GainError", "LawSpec", "make", "register_law"]
+
+__getattr__ = lazy(__name__, {"LawSpec": "controllers.law_spec", "register_law": "controllers.registration"})
 
 
 def make(name: str, env: Any, **overrides: Any) -> Any:

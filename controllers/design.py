@@ -15,19 +15,19 @@ from numpy.typing import NDArray
 
 from artde_gym.errors import UnknownNameError, suggest_names
 from controllers.drive import DRIVES, Drive
-from controllers.law_table import LAWS
+from controllers.law_table import LAWS, find_law, is_delayed, known_laws
 from controllers.laws.errors import GainError
 from controllers.laws.stability import largest_joint_m_bar, largest_m_bar, tde_eigenvalues
 from controllers.laws.tde import TdeGains
 from controllers.laws.tracking import check_positive_number
 from controllers.loop import Loop
 from controllers.motion import check_motion
-from controllers.presets import LOOPS, preset_gains
+from controllers.presets import LOOPS, law_presets, preset_gains
 
 Array = NDArray[np.floating[Any]]
 
-DELAYED = ("tde", "atde", "artde", "tde+c", "tde+kd")
-"""Laws that estimate by time delay."""
+DELAYED = tuple(name for name in LAWS if is_delayed(name))
+"""Laws of this project that estimate by time delay."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -162,7 +162,7 @@ def design(
 
     Args:
         robot: that has a drive with a model, as `loops`.
-        law: one of `DELAYED`.
+        law: one of `DELAYED`, or of your own that is like one of these.
         preset: name of its gains; None for the law's default.
         period: L that the law divides by (s); None for the robot's usual sampling period.
         gains: in place of the preset's.
@@ -174,19 +174,25 @@ def design(
         OptionError: for an argument of the motion that is not allowed.
     """
     found = loops(robot, **motion)
-    if law not in DELAYED:
-        raise UnknownNameError("law with a time-delay estimate", law, suggest_names(law, DELAYED))
+    if law not in (able := delayed()):
+        raise UnknownNameError("law with a time-delay estimate", law, suggest_names(law, able))
     chosen = preset_gains(robot, law, preset, len(found[0].joints), gains or {})
     length = DRIVES[robot].period if period is None else period
     return [judge(loop, _of_loop(chosen, loop, law, length), length) for loop in found]
+
+
+def delayed() -> list[str]:
+    """Return the laws that estimate by time delay, those from outside included."""
+    return [name for name in known_laws() if is_delayed(name)]
 
 
 def preset_designs(loop: Loop, drive: Drive, chosen: Callable[[str], bool] | None = None) -> list[Design]:
     """Judge a loop at the chosen presets, by default all, of laws that estimate by time delay."""
     return [
         judge(loop, _of_loop(entry.gains, loop, law, drive.period), drive.period)
-        for (law, preset), entry in drive.presets.items()
-        if law in DELAYED and (chosen is None or chosen(preset))
+        for law in delayed()
+        for preset, entry in law_presets(drive, law).items()
+        if chosen is None or chosen(preset)
     ]
 
 
@@ -198,4 +204,4 @@ def _number(value: float) -> float | None:
 def _of_loop(gains: Any, loop: Loop, law: str, period: float) -> TdeGains:
     """Return the gains of one loop, of a cascade or whole, as the law runs them."""
     own = getattr(gains, loop.name) if loop.name in LOOPS else gains
-    return LAWS[law].convert(own, period)
+    return find_law(law).convert(own, period)

@@ -33,6 +33,10 @@ class EncoderPolicy(TrackingPolicy):
         self._cutoff_hz = cutoff_hz
         self._period = interface.control_period
 
+    @property
+    def code(self) -> tuple[Any, ...]:
+        return self._inner.code
+
     def start(self, signals: JointInput) -> LawState:
         state = estimate_init(signals, self._period)
         seen, _ = estimate(self._cutoff_hz, state, signals, self._period)

@@ -6,7 +6,7 @@ from typing import Any
 
 from artde_gym.errors import OptionError
 from controllers.encoders import EncoderPolicy
-from controllers.law_table import LAWS
+from controllers.law_table import find_law
 from controllers.laws.tracking import Array, JointInput, LawState, check_positive_number
 from controllers.policies import ControlInterface, TrackingPolicy
 from controllers.presets import preset_gains
@@ -23,13 +23,17 @@ class LawPolicy(TrackingPolicy):
 
     def __init__(self, name: str, interface: ControlInterface, gains: Any, time_base: float = 1.0) -> None:
         check_positive_number("time_base", time_base)
-        entry = LAWS[name]
+        entry = find_law(name)
         if missing := set(entry.reads) - set(interface.observation.slices):
             raise OptionError(f"observation of the environment of {name!r}", list(interface.observation.slices),
                               f"with {', '.join(sorted(missing))}, as that of BipedWalk-Payload-v0")  # fmt: skip
         self._further = [interface.observation[field] for field in entry.reads]
         self._law, self._period = entry.law, time_base * interface.control_period
         super().__init__(name, interface, entry.convert(gains, self._period))
+
+    @property
+    def code(self) -> tuple[Any, ...]:
+        return self._law.start, self._law.step, self.gains.__class__
 
     def law(self) -> tuple[str, float]:
         return self.name, self._period

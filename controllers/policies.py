@@ -70,6 +70,11 @@ class Policy(abc.ABC):
         box = interface.action.box()
         self._low, self._high = box.low, box.high
 
+    @property
+    def code(self) -> tuple[Any, ...]:
+        """Functions and classes beside its own class whose source decides what it does."""
+        return ()
+
     @abc.abstractmethod
     def read(self, observation: Array) -> Any:
         """Return the signals of one sample in an observation (..., n_obs)."""

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from controllers.law_table import LAWS, Entry
+from controllers.law_spec import LawSpec
+from controllers.law_table import LAWS, find_law
 from controllers.laws.cascade import CascadeGains, CascadeState, QuadrotorInput, attitude_errors, cascade, cascade_init
 from controllers.laws.namespaces import namespace
 from controllers.laws.tracking import Array, LawState
@@ -29,9 +30,14 @@ class QuadrotorPolicy(Policy):
     """
 
     def __init__(
-        self, name: str, interface: ControlInterface, gains: CascadeGains, *, laws: tuple[Entry, Entry] | None = None
+        self,
+        name: str,
+        interface: ControlInterface,
+        gains: CascadeGains,
+        *,
+        laws: tuple[LawSpec, LawSpec] | None = None,
     ) -> None:
-        position, attitude = LOOP_LAWS[name] if laws is None else laws
+        position, attitude = loop_laws(name) if laws is None else laws
         self._position, self._attitude = position.law, attitude.law
         period = interface.control_period
         own = {
@@ -78,6 +84,11 @@ class QuadrotorPolicy(Policy):
         e_q, e_w = attitude_errors(self.gains, state, signals)
         return {"e_q": e_q, "e_w": e_w}
 
+    @property
+    def code(self) -> tuple[Any, ...]:
+        gains = self.gains.position.__class__, self.gains.attitude.__class__
+        return self._position.start, self._position.step, self._attitude.start, self._attitude.step, *gains
+
     def law(self) -> tuple[str, float]:
         return self.name, self._period
 
@@ -117,12 +128,20 @@ def _roll_pitch_yaw(axes: Axes) -> Array:
     return joined((np.arctan2(y[2], z[2]), pitch, np.arctan2(x[1], x[0])))
 
 
-LOOP_LAWS: dict[str, tuple[Entry, Entry]] = {
-    **{name: (LAWS[name], LAWS[name]) for name in ("tde", "atde", "artde", "tde+c", "tde+kd", "asmc", "indi")},
+LOOP_LAWS: dict[str, tuple[LawSpec, LawSpec]] = {
     "pid": (LAWS["positional-pid"], LAWS["positional-pid"]),
     "geometric": (LAWS["positional-pid"], LAWS["rigid-attitude"]),
 }
-"""Name -> the law of the position and the law of the attitude."""
+"""Name -> the law of the position and the law of the attitude, where these are not the one law of that name."""
+
+
+def loop_laws(name: str) -> tuple[LawSpec, LawSpec]:
+    """Return the laws of position and attitude that belong to a name.
+
+    Raises:
+        UnknownNameError: if there are none.
+    """
+    return LOOP_LAWS[name] if name in LOOP_LAWS else (find_law(name), find_law(name))
 
 
 def make_quadrotor(env: Any, *, law: str, preset: str | None = None, **gains: Any) -> QuadrotorPolicy:

@@ -2,33 +2,33 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from artde_gym.registration import ControllerSpec
-from controllers.law_table import GAINS, LAWS
-
-
-def _law(name: str, text: str, **kwargs: Any) -> ControllerSpec:
-    return ControllerSpec(name, "controllers.robots:make_for_robot", kwargs, text, "controllers.robots:tuning_space")
-
+from controllers.law_table import LAWS
+from controllers.registration import law_controller
 
 CONTROLLERS = (
-    *(_law(name, LAWS[name].text, law=name) for name in GAINS),
-    _law("artde-robust", "ARTDE with bounded gains", law="artde", preset="robust"),
-    _law("tde-stiff", "biped: TDE at a larger m_bar, with a margin to its limit", law="tde", preset="stiff"),
-    _law("atde-stiff", "biped: ATDE at a larger m_bar, with a margin to its limit", law="atde", preset="stiff"),
-    _law("artde-stiff", "biped: ARTDE at a larger m_bar, with a margin to its limit", law="artde", preset="stiff"),
-    _law("tde-tight", "quadrotor: TDE tuned on Q1, whose tracking is the tightest", law="tde", preset="tuned"),
-    _law("geometric", "quadrotor: geometric control on SE(3), with an integral", law="geometric"),
+    *(law_controller(name, spec.text, law=name) for name, spec in LAWS.items() if spec.gains is not None),
+    law_controller("artde-robust", "ARTDE with bounded gains", law="artde", preset="robust"),
+    law_controller("tde-stiff", "biped: TDE at a larger m_bar, with a margin to its limit", law="tde", preset="stiff"),
+    law_controller(
+        "atde-stiff", "biped: ATDE at a larger m_bar, with a margin to its limit", law="atde", preset="stiff"
+    ),
+    law_controller(
+        "artde-stiff", "biped: ARTDE at a larger m_bar, with a margin to its limit", law="artde", preset="stiff"
+    ),
+    law_controller(
+        "tde-tight", "quadrotor: TDE tuned on Q1, whose tracking is the tightest", law="tde", preset="tuned"
+    ),
+    law_controller("geometric", "quadrotor: geometric control on SE(3), with an integral", law="geometric"),
     *(
-        _law(
+        law_controller(
             f"{law}+swing",
             f"quadrotor with a cable: {law.upper()} + a term that damps the load's swing",
             law=f"{law}+swing",
         )
         for law in ("tde", "atde", "artde")
     ),
-    _law(
+    law_controller(
         "geometric-load",
         "quadrotor with a cable: geometric control of the load, whose mass it knows",
         law="geometric-load",

@@ -7,17 +7,19 @@ from typing import Any
 import numpy as np
 
 from artde_gym.errors import OptionError
-from controllers.law_table import Entry
+from controllers.law_spec import LawSpec
+from controllers.law_table import LAWS
 from controllers.laws.cascade import CascadeGains, QuadrotorInput, cascade
 from controllers.laws.load import LoadGains, load_control, load_start
 from controllers.laws.swing import Cable, swing_term
 from controllers.laws.tracking import Array, JointInput, Law, LawState
 from controllers.policies import ControlInterface
 from controllers.presets import preset_gains
-from controllers.quadrotor import AXES, LOOP_LAWS, QuadrotorPolicy, make_quadrotor
+from controllers.quadrotor import AXES, QuadrotorPolicy, loop_laws, make_quadrotor
 
 SWING = "+swing"
 """Suffix of a law's name with the swing term."""
+LOAD = "geometric-load"
 
 
 class SlungPolicy(QuadrotorPolicy):
@@ -28,7 +30,7 @@ class SlungPolicy(QuadrotorPolicy):
     """
 
     def __init__(
-        self, name: str, interface: ControlInterface, gains: CascadeGains, *, laws: tuple[Entry, Entry]
+        self, name: str, interface: ControlInterface, gains: CascadeGains, *, laws: tuple[LawSpec, LawSpec]
     ) -> None:
         if "cable" not in interface.observation.slices:
             raise OptionError("controller", name, "choose QuadSling-Payload-v0 or another one",
@@ -73,11 +75,7 @@ def _no_load(gains: LoadGains, state: Any, signals: JointInput, period: float) -
     return load_control(gains, state, signals, Cable(still, still, np.zeros(still.shape[:-1], np.bool_)), period)
 
 
-def _same(gains: LoadGains, _period: float) -> LoadGains:
-    return gains
-
-
-LOAD_LAW = Entry(Law(_load_start, _no_load), _same)
+LOAD_LAW = LawSpec(Law(_load_start, _no_load))
 
 
 def make_quadrotor_or_slung(env: Any, *, law: str, preset: str | None = None, **gains: Any) -> QuadrotorPolicy:
@@ -85,7 +83,7 @@ def make_quadrotor_or_slung(env: Any, *, law: str, preset: str | None = None, **
 
     Args:
         env: the environment that it will drive.
-        law: name of the law: one of `controllers.quadrotor.LOOP_LAWS`, that with "+swing", or "geometric-load".
+        law: name of the law: as for `controllers.quadrotor.make_quadrotor`, that with "+swing", or "geometric-load".
         preset: name of its gains; None for the law's default.
         gains: in place of the preset's, as for `controllers.quadrotor.make_quadrotor`.
 
@@ -94,10 +92,10 @@ def make_quadrotor_or_slung(env: Any, *, law: str, preset: str | None = None, **
         GainError: for an unknown gain or a value that is not allowed.
         OptionError: for a law that needs a cable, in an environment without one.
     """
-    if law in LOOP_LAWS:
+    if law != LOAD and not law.endswith(SWING):
         return make_quadrotor(env, law=law, preset=preset, **gains)
     interface = ControlInterface.of(env)
     own = preset_gains(interface.robot, law, preset, AXES, gains)
     if law.endswith(SWING):
-        return SwingPolicy(law, interface, own, laws=LOOP_LAWS[law.removesuffix(SWING)])
-    return LoadPolicy(law, interface, own, laws=(LOAD_LAW, LOOP_LAWS["tde"][1]))
+        return SwingPolicy(law, interface, own, laws=loop_laws(law.removesuffix(SWING)))
+    return LoadPolicy(law, interface, own, laws=(LOAD_LAW, LAWS["tde"]))

@@ -16,17 +16,18 @@ from numpy.typing import NDArray
 
 from artde_gym.errors import UnknownNameError, suggest_names
 from controllers.drive import DRIVES, Drive
+from controllers.law_table import LAWS, is_switched, known_laws
 from controllers.laws.stability import BLOCKED, largest_support_m_bar, support_eigenvalues, support_m_bar
 from controllers.laws.switched import SwitchedTdeGains
 from controllers.laws.tde import Inertia
 from controllers.loop import SupportPhase
 from controllers.motion import check_motion
-from controllers.presets import preset_gains
+from controllers.presets import law_presets, preset_gains
 
 Array = NDArray[np.floating[Any]]
 
-SWITCHED = ("tde-switched", "atde-switched", "artde-switched")
-"""Laws with a nominal inertia for each phase of support."""
+SWITCHED = tuple(name for name in LAWS if is_switched(name))
+"""Laws of this project with a nominal inertia for each phase of support."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,7 +94,7 @@ def design_supports(
 
     Args:
         robot: that has a drive with phases of support.
-        law: one of `SWITCHED`.
+        law: one of `SWITCHED`, or of your own with their gains.
         preset: name of its gains; None for the law's default.
         cap: largest eigenvalue of what is derived (kg m^2).
         gains: in place of the preset's.
@@ -107,8 +108,8 @@ def design_supports(
     able = {name: drive.supports for name, drive in DRIVES.items() if drive.supports is not None}
     if robot not in able:
         raise UnknownNameError("robot with phases of support", robot, suggest_names(robot, able))
-    if law not in SWITCHED:
-        raise UnknownNameError("law that switches", law, suggest_names(law, SWITCHED))
+    if law not in (laws := switched()):
+        raise UnknownNameError("law that switches", law, suggest_names(law, laws))
     check_motion(robot, able[robot], motion)
     phases = able[robot](**motion)
     chosen = preset_gains(robot, law, preset, len(phases[0].joints), gains or {})
@@ -133,9 +134,14 @@ def judge_supports(phases: Sequence[SupportPhase], gains: SwitchedTdeGains, cap:
     return found
 
 
+def switched() -> list[str]:
+    """Return the laws with a nominal inertia for each phase of support, those from outside included."""
+    return [name for name in known_laws() if is_switched(name)]
+
+
 def preset_supports(phases: Sequence[SupportPhase], drive: Drive) -> list[SupportDesign]:
     """Judge all presets of laws that switch."""
-    chosen = [entry.gains for (law, _), entry in drive.presets.items() if law in SWITCHED]
+    chosen = [preset.gains for law in switched() for preset in law_presets(drive, law).values()]
     return [one for gains in chosen for one in judge_supports(phases, gains, 1.0)]
 
 

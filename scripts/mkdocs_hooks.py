@@ -9,7 +9,7 @@ from typing import Any
 from documentation.figures import FIGURES
 from documentation.mathematics import font, mathml, symbols
 from documentation.notebooks import NOTEBOOKS, notebook
-from documentation.pages import ROOT, cards, generated
+from documentation.pages import ROOT, cards, generated, laws
 from documentation.replays import frame
 from mkdocs.structure.files import File
 
@@ -21,9 +21,10 @@ _symbols: set[int] = set()
 
 
 def on_config(config: Any) -> None:
-    """List the policies that are shipped: their number is not up to `mkdocs.yml`."""
+    """List what `mkdocs.yml` does not: the policies that are shipped, and laws without a page of their own."""
     results = next(section["Results"] for section in config.nav if "Results" in section)
     results += [{f"Policy {card.parent.name}": f"policies/{card.parent.name}.md"} for card in cards()]
+    next(section["Laws"] for section in config.nav if "Laws" in section).extend(laws())
 
 
 def on_files(files: Any, config: Any) -> None:

@@ -23,14 +23,18 @@ from documentation.blocks import Block, blocks, commands, mentions, script
 from documentation.figures import FIGURES
 from documentation.notebooks import NOTEBOOKS, notebook
 from documentation.pages import ROOT, generated
+from documentation.pages import laws as generated_laws
 from documentation.plant import ARM, modeled, simulate
 from nbclient import NotebookClient
 
 from artde_gym.cli import app
 from artde_gym.evaluation.environments import ours
 from artde_gym.scenarios import SCENARIOS
+from controllers.law_spec import LawSpec
 from controllers.law_table import LAWS
 from controllers.laws.computed_torque import ComputedTorqueGains
+from controllers.laws.tde import TdeGains
+from controllers.laws.tracking import Law, desired_acceleration
 
 DOCS = ROOT / "docs"
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -252,15 +256,29 @@ def test_an_option_that_is_none_is_found():
         parse(["evaluate", "--episods", "3"])
 
 
-def test_every_law_has_a_page_with_its_code_and_a_figure():
+def test_every_law_has_a_page_with_its_code_and_a_figure_or_a_generated_one():
     asked = {name: re.findall(r"<!-- (figure|source): (\S+) -->", text) for name, text in PAGES.items()}
-    laws = {path: text for path, text in asked.items() if path.startswith("laws/") and path != "laws/index.md"}
+    laws = {
+        path: text
+        for path, text in asked.items()
+        if path.startswith("laws/") and path not in ("laws/index.md", *generated_laws())
+    }
     assert all({kind for kind, _ in found} == {"figure", "source"} for found in laws.values())
     figures = {name for found in laws.values() for kind, name in found if kind == "figure"}
     sources = {name for found in laws.values() for kind, name in found if kind == "source"}
     assert figures == set(FIGURES) - {"rooms"}  # of the architecture page
     functions = {entry.law.step.__module__ for entry in LAWS.values() if "law_table" not in entry.law.step.__module__}
+    sources |= {source for page in generated_laws().values() for source in re.findall(r"<!-- source: (\S+) -->", page)}
     assert {f"{module.replace('.', '/')}.py" for module in functions} <= sources
+
+
+def test_a_law_without_a_page_gets_one_of_its_docstrings_and_code(monkeypatch):
+    step: Any = desired_acceleration
+    spec = LawSpec(Law(step, step), TdeGains, "a law of the test", like="tde")
+    monkeypatch.setitem(LAWS, "own", spec)
+    page = generated_laws()["laws/tracking.md"]
+    for part in ("# own", spec.text, "::: controllers.laws.tracking", "<!-- source: controllers/laws/tracking.py -->"):
+        assert part in page
 
 
 def test_an_arm_under_its_exact_model_obeys_the_designed_error():

@@ -18,7 +18,7 @@ from artde_gym.registration import registered_controllers
 from artde_gym.scenarios import SCENARIOS
 from artde_gym.sim.factory import ENGINES
 from controllers.drive import DRIVES
-from controllers.presets import LOOPS, named_gains
+from controllers.presets import LOOPS, law_presets, named_gains
 from controllers.presets.units import unit_of
 
 Entries = list[dict[str, Any]]
@@ -64,10 +64,9 @@ def controllers() -> Entries:
         presets: Entries = []
         own_gains: dict[str, None] = {}
         for robot, drive in DRIVES.items():
-            table = drive.presets
-            names = [preset for of, preset in table if of == law]
-            for preset in names:
-                entry = table[law, preset]
+            table = law_presets(drive, law)
+            names = list(table)
+            for preset, entry in table.items():
                 for loop in [getattr(entry.gains, field) for field in LOOPS if hasattr(entry.gains, field)] or [
                     entry.gains
                 ]:

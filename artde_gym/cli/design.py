@@ -22,11 +22,11 @@ from artde_gym.files import check_figure, write_atomically
 from artde_gym.kit import ROBOTS, find_robot
 from artde_gym.palette import STYLES
 from artde_gym.report.chart import Axis, Chart
-from controllers.design import DELAYED, Design, designed
+from controllers.design import DELAYED, Design, delayed, designed
 from controllers.design import design as work_out
 from controllers.drive import DRIVES
 from controllers.motion import check_motion
-from controllers.support_design import SWITCHED, SupportDesign, derived_gains, design_supports
+from controllers.support_design import SWITCHED, SupportDesign, derived_gains, design_supports, switched
 
 NAMES = [robot for robot in designed() if robot in ROBOTS]
 """Robots whose m_bar can be judged."""
@@ -36,7 +36,7 @@ def design(
     robot: Annotated[str | None, typer.Option(help=f"{' or '.join(NAMES)}. Default: that of {WALK}.")] = None,
     env: Annotated[str | None, typer.Option(help="Environment id, in place of the robot.")] = None,
     env_kwargs: EnvKwargs = None,
-    law: Annotated[str, typer.Option(help=f"{', '.join((*DELAYED, *SWITCHED))}.")] = "tde",
+    law: Annotated[str, typer.Option(help=f"{', '.join((*DELAYED, *SWITCHED))}, or your own.")] = "tde",
     preset: Annotated[str | None, typer.Option(help="Preset of the law's gains; see `list controllers`.")] = None,
     gains: Annotated[str | None, typer.Option(help='JSON; override gains of the preset, e.g. {"m_bar": 0.08}.')] = None,
     period: Annotated[float | None, typer.Option(help="Control period L (s). Default: the robot's.")] = None,
@@ -65,7 +65,7 @@ def design(
     inertias that follow from the robot's spec and gait.
     """
     name = _robot(robot, env)
-    switches = law in SWITCHED
+    switches = law in switched()
     _refuse_idle(switches, period, cap, figure)
     if period is not None:
         check_number("period", period, 1e-6, 10.0, "1e-6 to 10 s")
@@ -130,9 +130,9 @@ def _refuse_idle(switches: bool, period: float | None, cap: float | None, figure
     """Raise OptionError for an option that would do nothing with such a law."""
     for name, value in (("figure", figure), ("period", period)):
         if switches and value is not None:
-            raise OptionError(name, str(value), f"with a law of one m_bar: {', '.join(DELAYED)}")
+            raise OptionError(name, str(value), f"with a law of one m_bar: {', '.join(delayed())}")
     if not switches and cap is not None:
-        raise OptionError("cap", cap, f"with a law that switches: {', '.join(SWITCHED)}")
+        raise OptionError("cap", cap, f"with a law that switches: {', '.join(switched())}")
 
 
 def draw(one: Design) -> str:

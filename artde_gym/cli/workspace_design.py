@@ -17,7 +17,7 @@ from artde_gym.errors import OptionError
 from artde_gym.files import write_atomically
 from artde_gym.palette import STYLES
 from artde_gym.report.chart import Axis, Chart
-from controllers.design import DELAYED
+from controllers.design import delayed
 from controllers.drive import DRIVES
 from controllers.workspace_design import WorkspaceDesign
 
@@ -31,8 +31,8 @@ def show_workspace(
     Raises:
         OptionError: for a law without a time-delay estimate.
     """
-    if law not in DELAYED:
-        raise OptionError("law", law, ", ".join(DELAYED))
+    if law not in delayed():
+        raise OptionError("law", law, ", ".join(delayed()))
     found = _designed(env_id, env_kwargs, gains, period)
     if figure is not None:
         drawing = draw(found).encode()

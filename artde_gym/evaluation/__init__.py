@@ -8,14 +8,15 @@ from artde_gym.lazy import lazy
 if TYPE_CHECKING:
     from artde_gym.evaluation.evaluate import evaluate
     from artde_gym.evaluation.registered import Metric, register_metric
-    from artde_gym.evaluation.result import Result
+    from artde_gym.evaluation.result import Result, read_result
 
-__all__ = ["Metric", "Result", "evaluate", "register_metric"]
+__all__ = ["Metric", "Result", "evaluate", "read_result", "register_metric"]
 
 _OWN = {
     "Metric": "artde_gym.evaluation.registered",
     "Result": "artde_gym.evaluation.result",
     "evaluate": "artde_gym.evaluation.evaluate",
+    "read_result": "artde_gym.evaluation.result",
     "register_metric": "artde_gym.evaluation.registered",
 }
 _STUDIES = ("Frontier", "Reproduction", "Sweep", "Tuning", "frontier", "read_sweep", "reproduce", "sweep", "tune")

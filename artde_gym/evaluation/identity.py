@@ -61,7 +61,7 @@ def content_of(policy: Any) -> Identity | None:
 
 
 def behind(name: str, env_id: str, item: Any, policy: Any) -> dict[str, str]:
-    """Return hashes of a controller's learned weights, and of its code if that is the user's.
+    """Return hashes of a controller's learned weights, and of its code and its law's if that is the user's.
 
     Args:
         name: label of the controller.
@@ -76,6 +76,8 @@ def behind(name: str, env_id: str, item: Any, policy: Any) -> dict[str, str]:
     code: dict[str, Any] = {f"code of {name}": type(policy)}
     if isinstance(item, ControllerSpec):
         code[f"code that makes {name}"] = resolved(item.entry_point)
+    for part in getattr(policy, "code", ()):  # of a law
+        code[f"code of {name}: {part.__qualname__}"] = part
     for what, written in code.items():
         if written.__module__.split(".")[0] not in SOURCES:
             with contextlib.suppress(OSError, TypeError, SyntaxError):  # typed at a prompt, or changed since

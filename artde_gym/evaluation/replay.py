@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from artde_gym.arguments import check_integer, wrap_read_errors
-from artde_gym.deprecation import current_configuration
 from artde_gym.errors import OptionError, StoreError, UnknownNameError, suggest_names
 from artde_gym.evaluation.cells import Cell
 from artde_gym.evaluation.environments import metrics_spec_of, physics_of, robot_of, single_arguments
 from artde_gym.evaluation.plan import Plan
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.evaluation.seeds import episode_seed
-from artde_gym.evaluation.store import RECORD, read_episodes
+from artde_gym.evaluation.store import read_episodes, read_record
 from artde_gym.evaluation.takes import Take, compared, has_motion, new_take, stored_take, text_of
 from artde_gym.motion.replay import Replay
 from artde_gym.motion.scene import scene_of
@@ -163,12 +161,11 @@ class _Archive:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
+        self._configuration = read_record(folder)["configuration"]
         with wrap_read_errors("results folder", folder, "one that `evaluate` wrote", StoreError):
-            record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
-            self._configuration = current_configuration(record["configuration"])
             cells = self._configuration["cells"]
             self._cells = {cell["name"]: Cell(cell["name"], cell["env_id"], cell["kwargs"]) for cell in cells}
-        _, table = read_episodes(folder)
+        _, table = read_episodes(folder, self._configuration)
         self._rows: dict[str, dict[tuple[str, int], Row]] = {name: {} for name in self._cells}
         for row in table.to_dict(orient="records"):
             self._rows[row["scenario"]][row["controller"], row["episode"]] = {str(key): row[key] for key in row}

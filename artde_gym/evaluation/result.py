@@ -15,6 +15,7 @@ from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from artde_gym.evaluation import statistics
 from artde_gym.evaluation.pairing import DRAWN, episode_key, paired
 from artde_gym.evaluation.replay import replay_folder
+from artde_gym.evaluation.store import read_episodes, read_record, wanted_episodes
 from artde_gym.evaluation.wide_table import WideTable
 from artde_gym.motion.replay import Replay
 
@@ -196,6 +197,20 @@ class Result:
         columns = ["scenario", "metric", first, second, "difference", "low", "high"]
         columns += ["percent", "win_probability", "pairs"]
         return WideTable(lines, columns=columns).set_index(["scenario", "metric"])
+
+
+def read_result(folder: str | Path) -> Result:
+    """Read a folder that `evaluate` wrote, finished or not; the evaluation may still be running.
+
+    An ablation of `reproduce` is a folder of its own, `ablation/<scenario>`.
+
+    Raises:
+        StoreError: if the folder is not one, a file in it is damaged, or an episode is not of its configuration.
+    """
+    folder = Path(folder)
+    wanted = read_record(folder)["configuration"]
+    _, episodes = read_episodes(folder, wanted)
+    return Result(episodes, folder, len(episodes) >= wanted_episodes(wanted))
 
 
 def _check_known(field: str, name: str, known: Sequence[str]) -> None:

@@ -104,22 +104,10 @@ class Store:
 
     def _read_rows(self) -> list[dict[str, Any]]:
         path = self.folder / TABLE
-        whole, frame = read_episodes(self.folder)
-        if frame.empty:
-            return []
-        wanted = self._configuration
-        known = ([cell["name"] for cell in wanted["cells"]], wanted["controllers"], range(wanted["episodes"]))
-        for column, values in zip(KEY, known, strict=True):
-            strange = [value for value in frame[column] if value not in values]
-            if strange:
-                raise StoreError(TABLE, str(path), _REPAIR, f"has a {column} {strange[0]!r} of another run")
-        rows = [{str(key): value for key, value in row.items()} for row in frame.to_dict(orient="records")]
-        for row in rows:
-            if row["seed"] != episode_seed(wanted["seed"], row["episode"]):
-                raise StoreError(TABLE, str(path), _REPAIR, f"has another seed for episode {row['episode']}")
-        if path.stat().st_size != len(whole.encode()):
+        whole, frame = read_episodes(self.folder, self._configuration)
+        if not frame.empty and path.stat().st_size != len(whole.encode()):
             write_atomically(path, lambda file: file.write(whole.encode()))
-        return rows
+        return [{str(key): value for key, value in row.items()} for row in frame.to_dict(orient="records")]
 
     def _rewrite(self) -> None:
         """Write the whole table, for rows with additional columns."""
@@ -129,12 +117,51 @@ class Store:
         write_atomically(self.folder / TABLE, lambda file: file.write("".join(lines).encode()))
 
 
-def read_episodes(folder: Path) -> tuple[str, pd.DataFrame]:
+def read_record(folder: Path) -> dict[str, Any]:
+    """Return the content of a results folder's `summary.json`, its configuration under current names.
+
+    Raises:
+        StoreError: if there is none, or it is damaged.
+    """
+    with wrap_read_errors("results folder", folder, "one that `evaluate` or `frontier` wrote", StoreError):
+        record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+        record["configuration"] = current_configuration(record["configuration"])
+        wanted_episodes(record["configuration"])
+        return record
+
+
+def wanted_episodes(configuration: Mapping[str, Any]) -> int:
+    """Return the number of episodes of a configuration."""
+    names = [cell["name"] for cell in configuration["cells"]]
+    return len(names) * len(configuration["controllers"]) * configuration["episodes"]
+
+
+def read_episodes(folder: Path, configuration: Mapping[str, Any]) -> tuple[str, pd.DataFrame]:
     """Read the finished episodes, as text and parsed; a row cut off by a crash or an ongoing write is left out.
 
     Raises:
-        StoreError: if the table is damaged.
+        StoreError: if the table is damaged, or has episodes that are not of the configuration.
     """
+    whole, frame = _read_table(folder)
+    with wrap_read_errors(TABLE, folder / TABLE, _UNDAMAGED, StoreError):
+        _check_rows(folder / TABLE, frame, configuration)
+    return whole, frame
+
+
+def _check_rows(path: Path, frame: pd.DataFrame, wanted: Mapping[str, Any]) -> None:
+    """Raise StoreError for an episode that is not of the configuration."""
+    known = ([cell["name"] for cell in wanted["cells"]], wanted["controllers"], range(wanted["episodes"]))
+    for column, values in zip(KEY, known, strict=True):
+        strange = [value for value in frame[column] if value not in values]
+        if strange:
+            raise StoreError(TABLE, str(path), _REPAIR, f"has a {column} {strange[0]!r} of another run")
+    pairs = set() if frame.empty else set(zip(frame["episode"].tolist(), frame["seed"].tolist(), strict=True))
+    for episode, seed in pairs:
+        if seed != episode_seed(wanted["seed"], episode):
+            raise StoreError(TABLE, str(path), _REPAIR, f"has another seed for episode {episode}")
+
+
+def _read_table(folder: Path) -> tuple[str, pd.DataFrame]:
     path = folder / TABLE
     with wrap_read_errors(TABLE, path, _UNDAMAGED, StoreError):
         text = path.read_text(encoding="utf-8") if path.exists() else ""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,13 +11,12 @@ import pandas as pd
 
 from artde_gym.arguments import wrap_read_errors
 from artde_gym.arrays import Array
-from artde_gym.deprecation import current_configuration
 from artde_gym.errors import StoreError
 from artde_gym.evaluation.environments import metrics_spec_of
 from artde_gym.evaluation.metrics import Span, events_of
-from artde_gym.evaluation.result import Result
+from artde_gym.evaluation.result import Result, read_result
 from artde_gym.evaluation.rollout import nested
-from artde_gym.evaluation.store import parse_table, read_episodes, read_traces
+from artde_gym.evaluation.store import parse_table, read_record, read_traces
 from artde_gym.metrics_spec import MetricsSpec
 from artde_gym.palette import Style
 from artde_gym.studies.reproduce.claims import CLAIM_COLUMNS
@@ -52,12 +50,8 @@ class Run:
         Raises:
             StoreError: if it is not one.
         """
-        with wrap_read_errors("results folder", folder, "one that `evaluate` or `frontier` wrote", StoreError):
-            record = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-            wanted = record["configuration"] = current_configuration(record["configuration"])
-            count = len(wanted["cells"]) * len(wanted["controllers"]) * wanted["episodes"]
-        _, episodes = read_episodes(folder)
-        complete = len(episodes) >= count
+        record, result = read_record(folder), read_result(folder)
+        wanted, episodes, complete = record["configuration"], result.episodes, result.complete
         judged, claims = None, folder / "claims.csv"
         if claims.exists():
             with wrap_read_errors("claims.csv", claims, "a table that `reproduce` wrote", StoreError):

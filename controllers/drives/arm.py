@@ -89,9 +89,7 @@ def _presets() -> dict[tuple[str, str], Preset]:
         ),
         ("artde", "designed"): Preset(artde, _ROBUST),
         ("artde", "robust"): Preset(robust, f"{_ROBUST} with bounded gains"),
-        ("pid", "designed"): Preset(TdeGains(*feedback), f"{_SOURCE}, turned into PID gains"),
         ("tde+c", "designed"): Preset(constant, f"{_SOURCE}; c is the floor of ARTDE's"),
-        ("tde+kd", "designed"): Preset(constant, "the slope of tde+c at s = 0 as extra stiffness and damping"),
         ("computed-torque", "designed"): Preset(
             ComputedTorqueGains(feedback.k_p, feedback.k_d), f"{_SOURCE}, Kp and Kd"
         ),
@@ -102,7 +100,6 @@ _FEEDBACK: Ranges = {"k_p": (25.0, 50_000.0), "k_d": (10.0, 1000.0)}
 _ROBUST_TERM: Ranges = {**_FEEDBACK, "alpha": (0.5, 20.0), "gamma_0": (10.0, 5000.0)}
 RANGES: dict[str, Ranges] = {
     "tde": _FEEDBACK,
-    "pid": _FEEDBACK,
     "atde": _ROBUST_TERM,
     "artde": {**_ROBUST_TERM, "gamma_1": (10.0, 5000.0)},
     "computed-torque": _FEEDBACK,

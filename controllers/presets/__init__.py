@@ -10,8 +10,8 @@ import numpy as np
 from artde_gym.deprecation import warn
 from artde_gym.errors import UnknownNameError, suggest_names
 from artde_gym.registration import GainRange
-from controllers.drive import DRIVES, Preset
-from controllers.law_table import GAINS
+from controllers.drive import DRIVES, Drive, Preset, Ranges
+from controllers.law_table import find_law, known_laws
 from controllers.laws.errors import GainError
 
 LOOPS = {"position": "p", "attitude": "q"}
@@ -62,19 +62,67 @@ def gain_ranges(robot: str, law: str, preset: str | None) -> dict[str, GainRange
         UnknownNameError: as `preset_gains`, or for a law without tuning ranges.
     """
     gains = named_gains(_preset(robot, law, preset).gains)
-    known = DRIVES[robot].ranges
-    if law not in known:
+    drive = DRIVES[robot]
+    found = _ranges(drive, law)
+    if not found:
+        known = [name for name in {**drive.ranges, **known_laws()} if _ranges(drive, name)]
         raise UnknownNameError(f"controller of {robot!r} to be tuned", law, suggest_names(law, known))
-    return {name: GainRange(gains[name], low, high) for name, (low, high) in known[law].items()}
+    return {name: GainRange(gains[name], low, high) for name, (low, high) in found.items() if name in gains}
+
+
+def law_presets(drive: Drive, law: str) -> dict[str, Preset]:
+    """Return a law's gains on a robot by preset: the robot's for it, else those of the law that it is like."""
+    own = {name: preset for (of, name), preset in drive.presets.items() if of == law}
+    like = None if own else _like(law)
+    if like is None:
+        return own
+    kind = find_law(law).gains
+    taken = {name: (_as(kind, preset.gains), preset.source) for name, preset in law_presets(drive, like).items()}
+    return {name: Preset(gains, f"as for {like}: {source}") for name, (gains, source) in taken.items() if gains}
+
+
+def all_presets(drive: Drive) -> dict[tuple[str, str], Preset]:
+    """Return the gains of all laws on a robot by (law, preset)."""
+    laws = dict.fromkeys([*(law for law, _ in drive.presets), *known_laws()])
+    return {(law, name): preset for law in laws for name, preset in law_presets(drive, law).items()}
+
+
+def _like(law: str) -> str | None:
+    """Return the law whose presets a law takes; None for a law of its own, and for any other name."""
+    return find_law(law).like if ":" in law or law in known_laws() else None
+
+
+def _as(kind: Any, gains: Any) -> Any:
+    """Return gains as those of another law, of a cascade in both loops; None if it needs others."""
+    loops = {loop: _as(kind, getattr(gains, loop)) for loop in LOOPS if hasattr(gains, loop)}
+    if loops:
+        return dataclasses.replace(gains, **loops) if all(loops.values()) else None
+    fields = dataclasses.fields(kind)
+    if any(field.default is dataclasses.MISSING and not hasattr(gains, field.name) for field in fields):
+        return None
+    return kind(**{field.name: getattr(gains, field.name) for field in fields if hasattr(gains, field.name)})
+
+
+def _ranges(drive: Drive, law: str) -> Ranges:
+    """Return a law's tuning ranges on a robot; empty if it has none."""
+    like = None if law in drive.ranges else _like(law)
+    if like is None:
+        return drive.ranges.get(law, {})
+    cascade = any(hasattr(preset.gains, loop) for preset in law_presets(drive, law).values() for loop in LOOPS)
+    suffixes = [f"_{suffix}" for suffix in LOOPS.values()] if cascade else [""]
+    own = {f"{gain}{suffix}": span for gain, span in find_law(law).ranges.items() for suffix in suffixes}
+    return {**_ranges(drive, like), **own}
 
 
 def _given(robot: str, law: str, preset: str | None, gains: dict[str, Any]) -> Any:
     """Gains of a robot without presets, all of them given."""
     if preset is not None:
         raise UnknownNameError(f"preset of {law!r} for {robot!r}", preset, "none: the robot has no presets")
-    if law not in GAINS:
-        raise UnknownNameError(f"controller of {robot!r}", law, suggest_names(law, GAINS))
-    fields = {field.name: field for field in dataclasses.fields(GAINS[law])}
+    known = known_laws()
+    if law not in known and ":" not in law:
+        raise UnknownNameError(f"controller of {robot!r}", law, suggest_names(law, known))
+    kind: Any = find_law(law).gains
+    fields = {field.name: field for field in dataclasses.fields(kind)}
     for name in gains:
         if name not in fields:
             raise GainError(f"of {law!r}", name, suggest_names(name, fields))
@@ -82,20 +130,19 @@ def _given(robot: str, law: str, preset: str | None, gains: dict[str, Any]) -> A
     if missing := [name for name in needed if name not in gains]:
         allowed = f"{', '.join(needed)}, all of them: {robot!r} has no presets, for which its plug-in needs a Drive"
         raise GainError(f"of {law!r} not given", ", ".join(missing), allowed)
-    return GAINS[law](**gains)
+    return kind(**gains)
 
 
 def _preset(robot: str, law: str, preset: str | None) -> Preset:
     if robot not in DRIVES:
         raise UnknownNameError("robot with presets", robot, suggest_names(robot, DRIVES))
-    known = DRIVES[robot].presets
-    laws = list(dict.fromkeys(name for name, _ in known))
-    if law not in laws:
+    known = law_presets(DRIVES[robot], law)
+    if not known:
+        laws = list(dict.fromkeys(name for name, _ in all_presets(DRIVES[robot])))
         raise UnknownNameError(f"controller of {robot!r}", law, suggest_names(law, laws) if laws else "none yet")
-    names = [name for own, name in known if own == law]
-    if preset is not None and preset not in names:
-        raise UnknownNameError(f"preset of {law!r} for {robot!r}", preset, ", ".join(map(repr, names)))
-    return known[law, preset or names[0]]
+    if preset is not None and preset not in known:
+        raise UnknownNameError(f"preset of {law!r} for {robot!r}", preset, ", ".join(map(repr, known)))
+    return known[preset or next(iter(known))]
 
 
 def named_gains(gains: Any) -> dict[str, Any]:

@@ -70,9 +70,7 @@ OJAS: dict[tuple[str, str], Preset] = {
         dataclasses.replace(_ARTDE, growth="midpoint", clamp=True, leakage=0.1, cap=1.0),
         "ours: the thesis' gains with an unbiased growth test, a floor for each gain, leakage and a cap",
     ),
-    ("pid", "thesis"): Preset(_TDE, f"{_THESIS}, turned into the PID gains m_bar Kd/L, m_bar Kp/L, m_bar/L"),
     ("tde+c", "thesis"): Preset(_CONSTANT, f"{_THESIS}; c is the mean of ARTDE's over S1"),
-    ("tde+kd", "thesis"): Preset(_CONSTANT, "the slope of tde+c at s = 0 as extra stiffness and damping"),
     ("computed-torque", "thesis"): Preset(ComputedTorqueGains(_K_P, _K_D), f"{_THESIS}, Kp and Kd"),
     **{
         (law, "stiff"): Preset(dataclasses.replace(gains, m_bar=STIFF_M_BAR), _STIFF)
@@ -80,9 +78,7 @@ OJAS: dict[tuple[str, str], Preset] = {
             "tde": _TDE,
             "atde": _ATDE,
             "artde": _ARTDE,
-            "pid": _TDE,
             "tde+c": _CONSTANT,
-            "tde+kd": _CONSTANT,
         }.items()
     },
     ("tde-switched", "support"): Preset(SwitchedTdeGains(**{**vars(_TDE), **_SWITCHED}), _SUPPORT),
@@ -95,7 +91,6 @@ _FEEDBACK: Ranges = {"k_p": (5.0, 200.0), "k_d": (3.0, 40.0)}
 _DELAYED: Ranges = {"m_bar": (0.01, 0.08), **_FEEDBACK}
 OJAS_RANGES: dict[str, Ranges] = {
     "tde": _DELAYED,
-    "pid": _DELAYED,
     "atde": {**_DELAYED, "alpha": (0.5, 20.0), "gamma_0": (10.0, 5000.0)},
     "artde": {**_DELAYED, "alpha": (0.5, 20.0), "gamma_0": (10.0, 5000.0), "gamma_1": (10.0, 5000.0)},
     "tde+c": {**_DELAYED, "alpha": (0.5, 20.0), "c": (0.01, 10.0)},

@@ -126,7 +126,6 @@ Q450: dict[tuple[str, str], Preset] = {
         _TUNED,
     ),
     ("tde+c", "thesis"): Preset(_CONSTANT, f"{_THESIS}; c is the mean of ARTDE's over Q1"),
-    ("tde+kd", "thesis"): Preset(_CONSTANT, "the slope of tde+c at s = 0 as extra stiffness and damping"),
     ("pid", "hand"): Preset(
         _cascade(
             PositionalPidGains(_MASS, 10.0, 5.0, k_i=5.0, integral_limit=20.0),

@@ -26,6 +26,7 @@ from controllers.laws.rigid_attitude import rigid_attitude
 from controllers.laws.tde import ConstantGains, equivalent_gains
 from controllers.laws.tracking import JointInput, components
 from controllers.laws.vectors import joined
+from controllers.presets import law_presets
 from documentation.architecture import rooms
 from documentation.plant import ARM, DURATION, LIFT, LOADED, PUSHED, Plant, Run, modeled, simulate
 from documentation.sling import swing
@@ -234,9 +235,7 @@ FIGURES: dict[str, Callable[[], str]] = {
 
 def gains_of(robot: str, law: str, preset: str | None = None) -> Any:
     """Gains of a preset; a law's first one by default."""
-    return next(
-        entry.gains for (own, name), entry in DRIVES[robot].presets.items() if own == law and preset in (None, name)
-    )
+    return next(entry.gains for name, entry in law_presets(DRIVES[robot], law).items() if preset in (None, name))
 
 
 @functools.cache

@@ -15,6 +15,8 @@ from artde_gym.evaluation.environments import ours, robot_of
 from artde_gym.registration import registered_controllers
 from artde_gym.scenarios import SCENARIOS
 from controllers.drive import DRIVES
+from controllers.law_table import LAWS
+from controllers.presets import all_presets
 from documentation.replays import OF_ENVIRONMENTS
 
 ROOT = Path(__file__).parents[2]
@@ -41,6 +43,7 @@ def generated() -> dict[str, str]:
     pages |= {
         f"policies/{card.parent.name}.md": _moved(card.read_text(encoding="utf-8"), r"\.\./", "") for card in cards()
     }
+    pages |= laws()
     pages["contributing.md"] = _linked_to_site((ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"))
     pages["changelog.md"] = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     return pages
@@ -49,6 +52,19 @@ def generated() -> dict[str, str]:
 def cards() -> list[Path]:
     """Return the model cards of the shipped policies."""
     return sorted((ROOT / "baselines/policies").glob("*/README.md"))
+
+
+def laws() -> dict[str, str]:
+    """Return a page of the docstrings and the code for each law that no page shows."""
+    shown = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs/laws").glob("*.md"))
+    pages: dict[str, str] = {}
+    for name, spec in LAWS.items():
+        module = spec.law.step.__module__
+        path = f"{module.replace('.', '/')}.py"
+        if module.startswith("controllers.laws.") and f"<!-- source: {path} -->" not in shown:
+            page = f"# {name}\n\n{spec.text}\n\n::: {module}\n\n## Code\n\n<!-- source: {path} -->\n"
+            pages[f"laws/{module.rsplit('.', 1)[1]}.md"] = page
+    return pages
 
 
 def environment(env_id: str) -> str:
@@ -93,7 +109,7 @@ def _presets(robot: str) -> str:
     rows = ["| controller | what it is | preset | source of its gains |", "|---|---|---|---|"]
     rows += [
         f"| `{law}` | {texts.pop(law, '')} | `{preset}` | {entry.source} |"
-        for (law, preset), entry in DRIVES[robot].presets.items()
+        for (law, preset), entry in all_presets(DRIVES[robot]).items()
     ]
     return "\n".join(rows)
 

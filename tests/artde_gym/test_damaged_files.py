@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from artde_gym.errors import ArtdeGymError, OptionError, StoreError
-from artde_gym.evaluation import evaluate
+from artde_gym.evaluation import evaluate, read_result
 from artde_gym.evaluation.tasks import Update
 from artde_gym.report import write_report
 from artde_gym.studies import frontier, sweep, tune
@@ -99,6 +99,7 @@ READERS: dict[str, tuple[Callable[[Path], Any], Callable[[Path], Any], int]] = {
     "sweep file": (written, swept, TRIES),
     "sweep": (swept, swept, TRIES),
     "report": (evaluated, reported, TRIES),
+    "result": (evaluated, read_result, TRIES),
     "report of a frontier": (searched, reported, TRIES),
 }
 """What reads -> (what makes the folder, the reader, how many times)."""

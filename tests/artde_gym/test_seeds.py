@@ -12,9 +12,8 @@ import pandas as pd
 import pytest
 
 from artde_gym.errors import StoreError
-from artde_gym.evaluation import Result, evaluate
+from artde_gym.evaluation import Result, evaluate, read_result
 from artde_gym.evaluation.seeds import SEED, episode_seed
-from artde_gym.evaluation.store import read_episodes
 from artde_gym.studies.sweep.execution import sweep
 from artde_gym.studies.sweep.store import read_sweep
 
@@ -51,7 +50,7 @@ def test_seeds_survive_a_folder_and_all_its_formats(tmp_path: Path, vectorized: 
     }
     found = evaluate(["tde"], QUADROTOR, episodes=len(seeds), **common).episodes
     assert found["seed"].tolist() == seeds
-    _, stored = read_episodes(tmp_path)
+    stored = read_result(tmp_path).episodes
     again = evaluate(["tde"], QUADROTOR, episodes=len(seeds), **common).episodes
     for episodes in (found, stored, again, found.head(1)):
         assert episodes["seed"].dtype == SEED

@@ -131,7 +131,13 @@ KIT = RobotKit(
         }
     ),
     scenarios=_SCENARIOS,
-    reproduced=(tuple(entry.name for entry in _SCENARIOS), ("tde", "atde", "artde", "tde-stiff")),
+    reproduced=(
+        (
+            *("S1", "S2", "S3", "S1-L4", "S2-L4", "S3-L4"),
+            *(f"{name}-GRF{percent}" for name in ("S1", "S2", "S3") for percent in (33, 45, 50)),
+        ),
+        ("tde", "atde", "artde", "tde-stiff"),
+    ),
     reported=REPORTED,
     frontier=_FRONTIER,
     motion=Motion("walk", 6.0, 2.0),

@@ -55,7 +55,7 @@ def value_text(row: Mapping[Any, Any], unit: str) -> str:
 
 def direction_note(found: Frontier) -> str:
     """Say which controllers survive the hardest level more often than the easiest one; "" if none does."""
-    rates = found.levels.set_index(["controller", "value"])["rate"]
+    rates = found.levels.set_index(["controller", "value"])["rate"].to_dict()
     easiest, hardest = found.axis.levels[0], found.axis.levels[-1]
     rising = [
         str(name)
