@@ -65,6 +65,8 @@ def controllers() -> Entries:
         own_gains: dict[str, None] = {}
         for robot, drive in DRIVES.items():
             table = law_presets(drive, law)
+            if wanted not in (None, *table):
+                continue  # the name stands for a preset that the robot does not have
             names = list(table)
             for preset, entry in table.items():
                 for loop in [getattr(entry.gains, field) for field in LOOPS if hasattr(entry.gains, field)] or [

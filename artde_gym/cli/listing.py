@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.padding import Padding
 from rich.text import Text
 
 from artde_gym.cli.arguments import names
@@ -15,6 +16,8 @@ from artde_gym.cli.catalog import TOPICS, Entries
 from artde_gym.cli.display import terminal
 from artde_gym.errors import UnknownNameError, suggest_names
 from artde_gym.evaluation.fitting_table import FittingTable
+
+BATCH = "batch: a vector of many environments at once, by gymnasium.make_vec or --vectorized."
 
 Shown = Callable[[Entries, Console], None]
 
@@ -38,10 +41,10 @@ def list_everything(
         print(json.dumps(found if topic is None else found[topic], indent=2))
         return
     console = terminal()
-    for one, entries in found.items():
-        (_SHORT if topic is None else _FULL)[one](entries, console)
     if topic is None:
-        console.print(f"For details: `artde-gym list` with one of {', '.join(TOPICS)}.")
+        _summary(found, console)
+    else:
+        _FULL[topic](found[topic], console)
 
 
 def _chosen(entries: Entries, topic: str, wanted: list[str]) -> Entries:
@@ -56,28 +59,14 @@ def _table(title: str, *columns: str) -> FittingTable:
     return FittingTable(*columns, title=title, title_style="bold")
 
 
-def _environments(entries: Entries, console: Console) -> None:
-    table = _table("Environments", "environment", "robot", "engines")
-    for entry in entries:
-        table.add_row(entry["name"], entry["robot"], ", ".join(entry["engines"]))
-    console.print(table)
-
-
 def _environments_in_full(entries: Entries, console: Console) -> None:
     for entry in entries:
         table = _table(f"{entry['name']}: {entry['robot']} in {', '.join(entry['engines'])}", "argument", "default")
         for argument, default in entry["arguments"].items():
             table.add_row(argument, "the environment's own" if argument == "disturbances" else repr(default))
         console.print(table)
+    _line(console, BATCH)
     console.print("Arguments, observation, action and reward are explained by help(gymnasium.make(...).unwrapped)")
-
-
-def _scenarios(entries: Entries, console: Console) -> None:
-    table = _table("Scenarios", "scenario", "description")
-    for entry in entries:
-        arguments = "".join(f", {key}={value}" for key, value in entry["arguments"].items())
-        table.add_row(entry["name"], _with_detail(entry["text"], entry["environment"] + arguments))
-    console.print(table)
 
 
 def _scenarios_in_full(entries: Entries, console: Console) -> None:
@@ -87,17 +76,6 @@ def _scenarios_in_full(entries: Entries, console: Console) -> None:
         _line(console, f"{entry['environment']} in {', '.join(entry['engines'])}{beside}")
         _line(console, f"arguments: {json.dumps(entry['arguments'])}")
         _line(console, f"disturbances: {json.dumps(entry['disturbances'])}")
-
-
-def _controllers(entries: Entries, console: Console) -> None:
-    table = _table("Controllers", "controller", "description, gains, presets")
-    for entry in entries:
-        presets: dict[str, list[str]] = {}
-        for preset in entry["presets"]:
-            presets.setdefault(preset["robot"], []).append(preset["preset"])
-        detail = [" ".join(entry["gains"]), "; ".join(f"{robot}: {', '.join(own)}" for robot, own in presets.items())]
-        table.add_row(entry["name"], _with_detail(entry["text"], *filter(None, detail)))
-    console.print(table)
 
 
 def _controllers_in_full(entries: Entries, console: Console) -> None:
@@ -122,15 +100,6 @@ def _controllers_in_full(entries: Entries, console: Console) -> None:
                   "unit are words, or have mixed SI units because Q = I.")  # fmt: skip
 
 
-def _disturbances(entries: Entries, console: Console) -> None:
-    table = _table("Disturbances", "kind", "description, robots, parameters")
-    for entry in entries:
-        parameters = ", ".join(parameter["name"] for parameter in entry["parameters"])
-        name = entry["name"] + (" (list)" if entry["list"] else "")
-        table.add_row(name, _with_detail(entry["text"], f"{', '.join(entry['robots'])}: {parameters}"))
-    console.print(table)
-
-
 def _disturbances_in_full(entries: Entries, console: Console) -> None:
     for entry in entries:
         _head(console, entry["name"] + (" (list)" if entry["list"] else ""), entry["text"])
@@ -151,15 +120,54 @@ def _disturbances_in_full(entries: Entries, console: Console) -> None:
 
 
 def _frontiers(entries: Entries, console: Console) -> None:
-    table = _table("Frontiers", "varied", "environment", "from", "to", "step", "harder")
+    """Print one table for all environments with the same ranges."""
+    by_environment: dict[str, list[tuple[Any, ...]]] = {}
     for entry in entries:
         numbers = (f"{entry[key]:g}" for key in ("low", "high", "tolerance"))
-        table.add_row(entry["name"], entry["environment"], *numbers, entry["harder"])
-    console.print(table)
+        by_environment.setdefault(entry["environment"], []).append((entry["name"], *numbers, entry["harder"]))
+    alike: dict[tuple[tuple[Any, ...], ...], list[str]] = {}
+    for environment, rows in by_environment.items():
+        alike.setdefault(tuple(rows), []).append(environment)
+    for rows, environments in alike.items():
+        _head(console, ", ".join(environments), "ranges of `artde-gym frontier --vary`")
+        table = _table("", "varied", "from", "to", "step", "harder")
+        for row in rows:
+            table.add_row(*row)
+        console.print(table)
 
 
-def _with_detail(text: str, *details: str) -> Text:
-    return Text.assemble(text, *((f"\n{detail}", "dim") for detail in details))
+def _summary(found: dict[str, Entries], console: Console) -> None:
+    """Print the names of all entries, grouped where they are many."""
+    environments = [{**entry, "engines": ", ".join(entry["engines"])} for entry in found["environments"]]
+    _names(console, "Environments", _grouped(environments, "engines"))
+    _line(console, BATCH)
+    _names(console, "Scenarios", _grouped(found["scenarios"], "environment"))
+    _names(console, "Controllers", {"": _of(found["controllers"])})
+    _names(console, "Disturbances", {"": _of(found["disturbances"])})
+    frontiers: dict[str, list[str]] = {}
+    for environment, varied in _grouped(found["frontiers"], "environment").items():
+        frontiers.setdefault(", ".join(varied), []).append(environment)
+    _names(console, "Frontiers", {", ".join(places): [varied] for varied, places in frontiers.items()})
+    console.print()
+    console.print(f"For details: `artde-gym list` with one of {', '.join(TOPICS)}.")
+
+
+def _names(console: Console, title: str, groups: dict[str, list[str]]) -> None:
+    console.print()
+    console.print(Text(title, style="bold"))
+    for group, members in groups.items():
+        console.print(Padding(Text((f"{group}: " if group else "") + ", ".join(members)), (0, 0, 0, 2)))
+
+
+def _of(entries: Entries) -> list[str]:
+    return [entry["name"] for entry in entries]
+
+
+def _grouped(entries: Entries, key: str) -> dict[str, list[str]]:
+    groups: dict[str, list[str]] = {}
+    for entry in entries:
+        groups.setdefault(entry[key], []).append(entry["name"])
+    return groups
 
 
 def _head(console: Console, name: str, text: str) -> None:
@@ -179,13 +187,6 @@ def _value(value: Any) -> str:
     return str(value) if isinstance(value, (str, bool)) else f"{value:.4g}"
 
 
-_SHORT: dict[str, Shown] = {
-    "environments": _environments,
-    "scenarios": _scenarios,
-    "controllers": _controllers,
-    "disturbances": _disturbances,
-    "frontiers": _frontiers,
-}
 _FULL: dict[str, Shown] = {
     "environments": _environments_in_full,
     "scenarios": _scenarios_in_full,

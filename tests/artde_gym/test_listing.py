@@ -29,6 +29,7 @@ def test_everything_has_a_place_and_fits_a_narrow_terminal() -> None:
         text = listing(*arguments)
         assert max(map(len, text.splitlines())) <= 80
     text = listing()
+    assert len(text.splitlines()) <= 60
     for name in (
         *SCENARIOS,
         *registered_controllers(),
@@ -41,6 +42,24 @@ def test_everything_has_a_place_and_fits_a_narrow_terminal() -> None:
     text = listing("disturbances", "--name", "push")
     for word in ("torso", "chest", "0 to 500 N", "required", '{"uniform": [low, high]}'):
         assert word in text
+
+
+@pytest.mark.parametrize("width", [60, 80])
+def test_no_name_of_the_summary_is_broken_and_none_stands_twice_in_a_row(width: int) -> None:
+    outcome = CliRunner().invoke(app, ["list"], env={"COLUMNS": str(width)})
+    assert max(map(len, outcome.output.splitlines())) <= width
+    words = {word.strip(",:") for word in outcome.output.split()}
+    frontiers = TOPICS["frontiers"]()
+    assert {*SCENARIOS, *registered_controllers(), *DISTURBANCES, *(entry["name"] for entry in frontiers)} <= words
+    assert "gymnasium.make_vec" in outcome.output
+    assert outcome.output.count("push.magnitude") < sum(entry["name"] == "push.magnitude" for entry in frontiers)
+
+
+def test_a_name_of_a_preset_has_the_robots_with_that_preset() -> None:
+    found = {entry["name"]: {one["robot"] for one in entry["presets"]} for entry in TOPICS["controllers"]()}
+    assert found["tde-tight"] == {"q450"}
+    assert found["tde-stiff"] == {"ojas"}
+    assert found["artde-robust"] == {"arm", "ojas", "q450"}
 
 
 def test_json_holds_the_gains_that_a_controller_has() -> None:
