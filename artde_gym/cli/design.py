@@ -128,11 +128,11 @@ def _motion(name: str, switches: bool) -> Callable[..., Any]:
 
 def _refuse_idle(switches: bool, period: float | None, cap: float | None, figure: Path | None) -> None:
     """Raise OptionError for an option that would do nothing with such a law."""
-    for name, value in (("figure", figure), ("period", period)):
+    for name, value in (("figure", None if figure is None else str(figure)), ("period", period)):
         if switches and value is not None:
-            raise OptionError(name, str(value), f"with a law of one m_bar: {', '.join(delayed())}")
+            raise OptionError(name, value, f"a law with one m_bar: {', '.join(delayed())}")
     if not switches and cap is not None:
-        raise OptionError("cap", cap, f"with a law that switches: {', '.join(switched())}")
+        raise OptionError("cap", cap, f"a law that switches: {', '.join(switched())}")
 
 
 def draw(one: Design) -> str:

@@ -8,12 +8,12 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from rich import box
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
+from artde_gym.cli.display import terminal
 from artde_gym.errors import OptionError
+from artde_gym.evaluation.fitting_table import FittingTable
 from artde_gym.files import write_atomically
 from artde_gym.palette import STYLES
 from artde_gym.report.chart import Axis, Chart
@@ -40,7 +40,7 @@ def show_workspace(
     if as_json:
         print(json.dumps({"robot": found.spec.name, "law": law, "env": env_id, **found.to_dict()}, indent=2))
         return
-    _print(found, Console())
+    _print(found, terminal())
 
 
 def _designed(env_id: str, env_kwargs: dict[str, Any], gains: dict[str, Any], period: float | None) -> WorkspaceDesign:
@@ -94,9 +94,8 @@ def _print(found: WorkspaceDesign, console: Console) -> None:
         console.print(line, markup=False, highlight=False)
 
 
-def _table(title: str, *columns: str) -> Table:
-    table = Table("joint", box=box.SIMPLE_HEAD, title=title, title_justify="left", padding=(0, 1, 0, 0))
-    table.columns[0].overflow = "fold"
+def _table(title: str, *columns: str) -> FittingTable:
+    table = FittingTable("joint", title=title)
     for column in columns:
         table.add_column(column, justify="right")
     return table

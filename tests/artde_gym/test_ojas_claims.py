@@ -21,6 +21,7 @@ from artde_gym.studies import reproduce
 from artde_gym.studies.reproduce.claims import judge, stays
 from controllers.design import design
 from controllers.drive import DRIVES
+from controllers.presets import law_presets
 
 WALK = "BipedWalk-Payload-v0"
 
@@ -129,7 +130,7 @@ def test_the_stiff_preset_keeps_its_margin(law: str) -> None:
     assert joints.valid
     assert joints.room >= 1.0 / 0.85
     assert 0.84 < joints.used <= 0.85
-    assert DRIVES["ojas"].presets[law, "stiff"].gains.m_bar == 0.077
+    assert law_presets(DRIVES["ojas"], law)["stiff"].gains.m_bar == 0.077
 
 
 def test_the_stiff_preset_is_a_controller() -> None:
