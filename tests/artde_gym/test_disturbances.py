@@ -295,7 +295,7 @@ def test_refusals_name_the_field_the_value_and_what_is_allowed(given_, field, va
     assert error.field == field
     if value is not None:
         assert error.value is value or error.value == value
-        assert repr(value) in str(error)
+        assert repr(value)[:100] in str(error)  # long ones are shortened
     assert field in str(error)
     assert error.allowed
     assert error.allowed in str(error)

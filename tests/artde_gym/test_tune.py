@@ -138,7 +138,7 @@ def test_the_biped_is_tuned_too():
         (["tde", "tde"], {}, OptionError, "given twice"),
         ("tde", {}, OptionError, "a list of names"),
         ([], {}, OptionError, "a list of names"),
-        (["tde+kd"], {}, UnknownNameError, "'q450' to be tuned is 'tde.kd'"),
+        (["tde+balance"], {}, UnknownNameError, "to be tuned is 'tde.balance'"),
         (["computed-torque"], {}, UnknownNameError, "'q450' is 'computed-torque'"),
         (["tde"], {"trials": 0}, OptionError, "trials is 0"),
         (["tde"], {"held_out": 2.5}, OptionError, "held_out is 2.5"),
