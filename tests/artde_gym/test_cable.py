@@ -16,7 +16,7 @@ from artde_gym.disturbances import Disturbances
 from artde_gym.errors import DisturbanceError, RobotError
 from artde_gym.robots.ojas.model import ojas
 from artde_gym.robots.q450.model import INERTIA, MASS, q450
-from artde_gym.robots.q450.task import parse
+from artde_gym.robots.q450.task import WORDS
 from artde_gym.sim import cable as law
 from artde_gym.sim.cables import Cables
 from artde_gym.sim.factory import EngineName, make_engine
@@ -344,7 +344,7 @@ def test_batch_is_loop_to_the_bit(kwargs: dict[str, Any]) -> None:
 )
 def test_a_bad_cable_is_refused(given: dict[str, Any], field: str, allowed: str) -> None:
     with pytest.raises(DisturbanceError, match=rf"{field}.*({allowed})"):
-        parse(given)
+        Disturbances.parse(given, WORDS["site"], WORDS["joint"], "q450")
 
 
 def test_a_biped_has_no_cable() -> None:
@@ -365,7 +365,8 @@ def test_a_biped_has_no_cable() -> None:
     ],
 )
 def test_a_cable_begins_at_a_hook_of_its_own(given: dict[str, Any], position: list[float]) -> None:
-    ((_, entry),) = parse({"payload": {"mass": 0.3, **given}}).entries
+    given = {"payload": {"mass": 0.3, **given}}
+    ((_, entry),) = Disturbances.parse(given, WORDS["site"], WORDS["joint"], "q450").entries
     assert list(entry["position"]) == position
 
 

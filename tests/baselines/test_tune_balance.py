@@ -106,7 +106,7 @@ def test_candidates_are_judged_as_if_each_were_alone(tuning):
 
 @pytest.mark.torch
 def test_what_has_no_balance_law_or_no_batch_is_refused(tuning, tmp_path):
-    with pytest.raises(TrainingError, match="the biped's synergies, of which the law has gains"):
+    with pytest.raises(TrainingError, match="'joints'; allowed: synergies, wide-synergies, of which the law has gains"):
         tuning.tune(
             Training("BipedPush-v0", ResidualConfig("ojas", action_mode="joints"), "cma-es"), tmp_path / "joints"
         )
