@@ -1,10 +1,14 @@
 """Training and its measurement leave no logs in the folder for temporary files."""
 
+from __future__ import annotations
+
 import tempfile
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+pytest.importorskip("stable_baselines3")
 
 from baselines.residual_config import ResidualConfig
 from baselines.run import Run, Training
