@@ -13,7 +13,7 @@ In a vector environment each entry `x` has a mask `_x` (n,), as usual in Gymnasi
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -34,7 +34,8 @@ class EpisodeInfo:
     Each `info` is a new dictionary of new arrays, so that callers cannot change each other's.
     """
 
-    def __init__(self, numbers: Mapping[str, Any], reasons: Sequence[str]) -> None:
+    def __init__(self, numbers: Mapping[str, Any], reasons: Sequence[str], terms: Iterable[str]) -> None:
+        self._rewards = [REWARD + name for name in terms]
         self._names = [FELL + name for name in reasons]
         self._arrays = [(name, value) for name, value in numbers.items() if type(value) is np.ndarray]
         self._still = {"time_s": 0.0, **numbers, **dict.fromkeys(EVENTS, 0), **dict.fromkeys(self._names, False)}
@@ -45,8 +46,7 @@ class EpisodeInfo:
         """Return the `info` of a step from the terms of the reward, the events and which reasons for a fall hold."""
         info = self._still.copy()
         info["time_s"] = time
-        for name, term in terms.items():
-            info[REWARD + name] = term
+        info.update(zip(self._rewards, terms.values(), strict=True))
         for name, array in self._arrays:
             info[name] = array.copy()
         for name in events:

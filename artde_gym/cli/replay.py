@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
 from rich.progress import Progress, TimeElapsedColumn
 
 from artde_gym.cli.arguments import (
@@ -50,9 +51,8 @@ def replay(
     from artde_gym.evaluation.replay import replay_folder
 
     console = terminal()
-    with Progress(
-        words("description"), TimeElapsedColumn(), console=console, transient=True, disable=not console.is_interactive
-    ) as bar:
+    place = console if console.is_interactive else Console(quiet=True)
+    with Progress(words("description"), TimeElapsedColumn(), console=place, transient=True) as bar:
         shown = bar.add_task("")
 
         def told(name: str, time: float) -> None:

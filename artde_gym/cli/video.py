@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
 from rich.progress import Progress, TimeElapsedColumn
 
 from artde_gym.cli.arguments import (
@@ -48,7 +49,8 @@ def video(
 
     console = terminal()
     columns_shown = (words("description"), TimeElapsedColumn())
-    with Progress(*columns_shown, console=console, transient=True, disable=not console.is_interactive) as bar:
+    place = console if console.is_interactive else Console(quiet=True)
+    with Progress(*columns_shown, console=place, transient=True) as bar:
         shown = bar.add_task("")
         file = make_video(
             names("--controllers", controllers),

@@ -109,6 +109,9 @@ class ArmTrackEnv(JointEnv[task.Tracking]):
     def _rest(self, sampled: Mapping[str, Any]) -> Array:
         return self._task.balance(sampled)
 
+    def _is_loaded(self) -> bool:
+        return True  # by the friction of the joints
+
     def _acting(self, tau: Array, step: int) -> Array:
         state = self._state if step == self.elapsed else self._engine.state()
         return super()._acting(tau, step) + self._task.friction(self._friction, state.qd)

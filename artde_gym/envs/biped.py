@@ -133,6 +133,9 @@ class BipedEnv(JointEnv[task.Walk]):
             self._engine.step(tau)
         return np.clip(tau, -robot.TORQUE_LIMIT, robot.TORQUE_LIMIT)
 
+    def _is_loaded(self) -> bool:
+        return self._pulses is not None or super()._is_loaded()
+
     def _acting(self, tau: Array, step: int) -> Array:
         if self._pulses is not None:
             loads = np.array([self._engine.foot_loads()])

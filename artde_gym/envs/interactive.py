@@ -22,6 +22,7 @@ class InteractiveMixin(DisturbedMixin, abc.ABC):
 
     time_step: ClassVar[float]  # s, of the physics
     fall_reasons: ClassVar[Sequence[str]]
+    reward_scales: ClassVar[Mapping[str, float]]
     schedule: Schedule  # of this episode's events
     _sampled: Mapping[str, Any]
 
@@ -76,4 +77,5 @@ class InteractiveMixin(DisturbedMixin, abc.ABC):
         return copy.deepcopy(dict(self._sampled))
 
     def _sample(self, sampled: Mapping[str, Any]) -> None:
-        self._sampled, self._told = sampled, EpisodeInfo(numeric(sampled, self.words), self.fall_reasons)
+        self._sampled = sampled
+        self._told = EpisodeInfo(numeric(sampled, self.words), self.fall_reasons, self.reward_scales)

@@ -55,6 +55,7 @@ class JointEnv(EngineEnv, Generic[Task]):
         self._open(engine, task.robot, camera, slack=slack)
         self._active = EpisodeDisturbances({}, task, self.np_random, self.observation_layout)
         self._effects = Effects(1, self.words)
+        self._loaded = False
         self._tau = self._previous = np.zeros(task.n)
 
     @abc.abstractmethod
@@ -82,6 +83,7 @@ class JointEnv(EngineEnv, Generic[Task]):
         self._active.start(self._engine)
         self.schedule = self._active.schedule
         self._effects.begin(0, sampled)
+        self._loaded = self._is_loaded()
         self._tau = self._rest(sampled)
         self._active.begin_walk(self._tau)
 
@@ -90,9 +92,14 @@ class JointEnv(EngineEnv, Generic[Task]):
         first = self.elapsed
         active.begin_period(command)
         for step in range(first, first + self._substeps):
-            engine.step(self._acting(active.apply(step, engine, events), step))
+            tau = active.apply(step, engine, events)
+            engine.step(self._acting(tau, step) if self._loaded else tau)
         self._previous, self._tau = self._tau, active.applied()
         return events
+
+    def _is_loaded(self) -> bool:
+        """Return True if other torques than those of the motors can act in this episode."""
+        return bool(self._effects.acting[0])
 
     def _acting(self, tau: Array, step: int) -> Array:
         """Return the torques (n,) that act in a time step: those of the motors, and what is added to them."""

@@ -147,7 +147,8 @@ class QuadInfinityPayloadEnv(EngineEnv):
         self._read()
 
     def _simulate(self, command: Array) -> list[str]:
-        engine, events = self._engine, []
+        sling, events = self._sling, []
+        engine, loaded = sling.moved, self._effects.acting[0]
         steps, first = self._substeps, self.elapsed
         self._before = self._rotors.thrusts
         thrusts = self._rotors.advance(command.tolist(), first)
@@ -160,15 +161,17 @@ class QuadInfinityPayloadEnv(EngineEnv):
             if self._ground_effect:
                 rows[start:end] = ((thrusts[start:end] * self._gains()) @ robot.MIXER.T).tolist()
             drag_x, drag_y, drag_z = self._drag()
-            load = self._effects.load_of(self._state, (first + start) * TIME_STEP)
+            load = self._effects.load_of(self._state, (first + start) * TIME_STEP) if loaded else None
             for step in range(start, end):
                 if not quiet:
-                    events += self.schedule.apply(first + step, engine)
+                    events += self.schedule.apply(first + step, sling)
+                    engine = sling.moved
                 u1, u2, u3, u4 = rows[step]
                 engine.apply_base_wrench((drag_x, drag_y, drag_z + u1), (u2, u3, u4))
-                load_base(engine, load, 0)
+                if load is not None:
+                    load_base(engine, load, 0)
                 engine.step(_NO_JOINTS)
-                pulled += self._sling.tension
+                pulled += sling.tension
             self._read()
         self._wrench = np.add.reduce(wrenches) / steps
         self._pulled = pulled * TIME_STEP  # impulse of the cable (N s)

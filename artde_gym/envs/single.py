@@ -45,7 +45,6 @@ class BaseEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any]], abc.ABC):
     action_layout: Layout
     observation_layout: Layout
     metrics_spec: MetricsSpec
-    reward_scales: ClassVar[Mapping[str, float]]
     allowed_action: ClassVar[str]
 
     def __init__(
@@ -120,8 +119,8 @@ class BaseEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any]], abc.ABC):
             gymnasium.error.ResetNeeded: after the end of the episode, or before the first reset.
             gymnasium.error.ClosedEnvironmentError: after `close`.
         """
-        self._require_open()
         if self._over:
+            self._require_open()
             raise gym.error.ResetNeeded("the episode is over or has not begun: call reset()")
         action = action_array(action, self._size, self.allowed_action)
         events = self._simulate(np.minimum(np.maximum(action, self._low), self._high))
@@ -140,7 +139,7 @@ class BaseEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any]], abc.ABC):
         return None if self.render_mode is None else self._draw()
 
     def close(self) -> None:
-        self._closed = True
+        self._closed = self._over = True
 
     @property
     def elapsed(self) -> int:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,6 +127,14 @@ class Sling:
         if self._hanging is not None:
             self._advance(self._hanging)
         self._engine.step(tau)
+
+    def state(self) -> State:
+        return self._engine.state()
+
+    @property
+    def moved(self) -> Engine:
+        """The engine to apply wrenches to and to step: without a cable, the robot's own."""
+        return self._engine if self._hanging is None else cast(Engine, self)
 
     def site(self, name: str) -> Vector:
         if name != PAYLOAD:

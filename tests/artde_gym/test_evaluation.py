@@ -21,7 +21,7 @@ from typer.testing import CliRunner
 import artde_gym
 from artde_gym.cli import app
 from artde_gym.errors import ArtdeGymError, DisturbanceError, OptionError, StoreError, UnknownNameError
-from artde_gym.evaluation import Result, evaluate, statistics, thesis
+from artde_gym.evaluation import Result, evaluate, read_result, statistics, thesis
 from artde_gym.evaluation.console import print_result
 from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.evaluation.tasks import Update
@@ -231,7 +231,7 @@ def test_scenarios_are_what_the_design_fixes() -> None:
 def test_folder_holds_what_the_documentation_says(tmp_path: Path) -> None:
     result = short(out=tmp_path / "run")
     folder = tmp_path / "run"
-    table = pd.read_csv(folder / "episodes.csv")
+    table = read_result(folder).episodes
     assert list(table["controller"]) == list(result.episodes["controller"])
     np.testing.assert_array_equal(table["rmse_deg_q3"], result.episodes["rmse_deg_q3"])  # to the last bit
     assert {"env", "scenario", "seed", "episode", "fell", "time_to_fall_s", "max_abs_error_deg_q6"} <= set(table)
