@@ -19,6 +19,12 @@ def terminal() -> Console:
     return Console(markup=False, emoji=False)
 
 
+def passing_bar(console: Console) -> Progress:
+    """Return a bar of one task's description and time, which vanishes, and shows nothing but in a terminal."""
+    place = console if console.is_interactive else Console(quiet=True)
+    return Progress(words("description"), TimeElapsedColumn(), console=place, transient=True)
+
+
 def words(field: str) -> TextColumn:
     """Return a progress-bar column that shows a field of its task without markup."""
     return TextColumn(f"{{task.{field}}}", markup=False)

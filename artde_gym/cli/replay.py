@@ -6,8 +6,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import Progress, TimeElapsedColumn
 
 from artde_gym.cli.arguments import (
     Disturbances,
@@ -20,7 +18,7 @@ from artde_gym.cli.arguments import (
     json_object,
     names,
 )
-from artde_gym.cli.display import terminal, words
+from artde_gym.cli.display import passing_bar, terminal
 from artde_gym.errors import OptionError
 
 
@@ -51,8 +49,7 @@ def replay(
     from artde_gym.evaluation.replay import replay_folder
 
     console = terminal()
-    place = console if console.is_interactive else Console(quiet=True)
-    with Progress(words("description"), TimeElapsedColumn(), console=place, transient=True) as bar:
+    with passing_bar(console) as bar:
         shown = bar.add_task("")
 
         def told(name: str, time: float) -> None:

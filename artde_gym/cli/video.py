@@ -7,8 +7,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import Progress, TimeElapsedColumn
 
 from artde_gym.cli.arguments import (
     WALK,
@@ -23,7 +21,7 @@ from artde_gym.cli.arguments import (
     json_object,
     names,
 )
-from artde_gym.cli.display import terminal, words
+from artde_gym.cli.display import passing_bar, terminal
 
 
 def video(
@@ -48,9 +46,7 @@ def video(
     from artde_gym.video import video as make_video  # only when asked for
 
     console = terminal()
-    columns_shown = (words("description"), TimeElapsedColumn())
-    place = console if console.is_interactive else Console(quiet=True)
-    with Progress(*columns_shown, console=place, transient=True) as bar:
+    with passing_bar(console) as bar:
         shown = bar.add_task("")
         file = make_video(
             names("--controllers", controllers),

@@ -71,7 +71,7 @@ class SwitchedTdeGains(TdeGains):
         return {}
 
     def matrices(self, n: int, dtype: Any) -> Matrices:
-        """Return the nominal inertias of `PHASES` as NumPy's matrices (n, n)."""
+        """Return the nominal inertia of each phase in `PHASES`, (n, n), in NumPy."""
         if (n, dtype) not in self._known:
             left, both, right = (as_matrix(m, n).astype(dtype) for m in self._inertias)
             self._known[n, dtype] = left, both, right

@@ -117,7 +117,7 @@ def test_warnings_point_at_the_line_of_the_user(name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name in ours() if not name.startswith("Biped")])  # which settles anew
 def test_a_payload_attached_on_demand_is_that_of_the_same_disturbance(name: str, engine_name: Any) -> None:
-    """What live play records is what an episode with the recorded disturbances does."""
+    """An episode with the disturbances that live play has recorded does the same again."""
     arguments: dict[str, Any] = {"engine": engine_name, "disable_env_checker": True, "duration": 0.3}
     played: Any = gym.make(name, disturbances={}, **arguments).unwrapped
     played.reset(seed=0)
