@@ -63,8 +63,8 @@ def register_controller(
         entry_point: "module:function"; the function is called as function(env, **kwargs, **overrides) and returns a
             policy with Stable-Baselines3's `predict`.
         text: one line for listings.
-        tuning_space: "module:function" for `artde-gym tune`; called as function(env, **kwargs), it returns a mapping
-            from gains to `GainRange`.
+        tuning_space: "module:function" for `artde-gym tune`; called as function(env, **kwargs), with a `preset` where
+            its caller has one, it returns a mapping from gains to `GainRange`.
         kwargs: fixed arguments of the function, which overrides cannot replace (except a `preset`).
 
     Raises:
@@ -119,8 +119,13 @@ def make_controller(name: str, env: Any, /, **overrides: Any) -> Any:
     return policy
 
 
-def tuning_space(name: str, env: Any) -> dict[str, GainRange]:
+def tuning_space(name: str, env: Any, preset: str | None = None) -> dict[str, GainRange]:
     """Return the tunable gains of the controller called `name` for the robot of an environment.
+
+    Args:
+        name: name of a controller.
+        env: the environment that it drives.
+        preset: preset whose gains are the initial ones; None for the controller's own.
 
     Raises:
         UnknownNameError: if no controller has this name, it has no tunable gains, or `tuning_space` cannot be
@@ -130,7 +135,8 @@ def tuning_space(name: str, env: Any) -> dict[str, GainRange]:
     if known.tuning_space is None:
         tunable = [other for other, spec in registered_controllers().items() if spec.tuning_space is not None]
         raise UnknownNameError("controller to be tuned", name, suggest_names(name, tunable))
-    return dict(_imported(name, known.tuning_space)(env, **known.kwargs))
+    selected = {} if preset is None else {REPLACEABLE: preset}
+    return dict(_imported(name, known.tuning_space)(env, **{**known.kwargs, **selected}))
 
 
 def _known(name: str) -> ControllerSpec:

@@ -19,7 +19,7 @@ from artde_gym.evaluation.rollout import Policy
 from artde_gym.evaluation.takes import INSIDE, effort_label, error_label, gain_label, signals_of
 from artde_gym.info import fall_reason
 from artde_gym.metrics_spec import MetricsSpec
-from artde_gym.registration import ControllerSpec, GainRange, registered_controllers, tuning_space
+from artde_gym.registration import REPLACEABLE, ControllerSpec, GainRange, registered_controllers, tuning_space
 
 NOWHERE = (float("nan"),) * 3  # of a payload that is not there
 
@@ -57,7 +57,7 @@ class Player:
         """Change the controller; what is refused changes nothing."""
         policy = self._built(name, item, gains)
         self.policy, self.name, self.item, self.gains = policy, name, item, gains
-        self.ranges = _ranges(item, self._env)
+        self.ranges = _ranges(item, self._env, gains.get(REPLACEABLE))
 
     def _built(self, name: str, item: Policy | ControllerSpec, gains: dict[str, Any]) -> Policy:
         try:
@@ -129,7 +129,7 @@ class Player:
     def sliders(self) -> dict[str, list[float]]:
         """Return initial value, bounds and current value of each gain that can be tuned."""
         return {
-            gain: [*space, self.gains[gain] if isinstance(self.gains.get(gain), float) else space.initial]
+            gain: [*space, self.gains[gain] if isinstance(self.gains.get(gain), int | float) else space.initial]
             for gain, space in self.ranges.items()
         }
 
@@ -155,10 +155,10 @@ def _labels(metrics: MetricsSpec) -> list[str]:
     return [*map(error_label, metrics.errors), *map(effort_label, metrics.efforts), *gains]
 
 
-def _ranges(item: Policy | ControllerSpec, env: Any) -> dict[str, GainRange]:
+def _ranges(item: Policy | ControllerSpec, env: Any, preset: str | None) -> dict[str, GainRange]:
     if not isinstance(item, ControllerSpec):
         return {}
     try:
-        return tuning_space(item.name, env)
+        return tuning_space(item.name, env, preset)
     except (UnknownNameError, OptionError):
         return {}

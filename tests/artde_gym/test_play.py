@@ -60,6 +60,13 @@ def again(game: Game, names: Any) -> Game:
     return watched
 
 
+@pytest.mark.parametrize("given", [{}, {"preset": "tuned"}, {"k_p_p": 7}, {"preset": "tuned", "m_bar_p": 1.5}], ids=str)
+def test_sliders_show_the_gains_that_act(given):
+    player = flying(["tde"], gains={"tde": given}).players[0]
+    acting = {f"{name}_p": getattr(player.policy.gains.position, name) for name in ("m_bar", "k_p", "k_d")}
+    assert {gain: player.sliders()[gain][-1] for gain in acting} == acting
+
+
 @pytest.mark.parametrize(("size", "falls"), [(5.0, False), (45.0, True)])
 def test_a_push_topples_or_not_and_evaluate_repeats_it(tmp_path, size, falls):
     game = walking()
