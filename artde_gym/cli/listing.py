@@ -16,6 +16,7 @@ from artde_gym.cli.catalog import TOPICS, Entries
 from artde_gym.cli.display import terminal
 from artde_gym.errors import UnknownNameError, suggest_names
 from artde_gym.evaluation.fitting_table import FittingTable
+from artde_gym.sim.factory import ENGINES
 
 BATCH = "batch: a vector of many environments at once, by gymnasium.make_vec or --vectorized."
 
@@ -65,7 +66,7 @@ def _environments_in_full(entries: Entries, console: Console) -> None:
         for argument, default in entry["arguments"].items():
             table.add_row(argument, "the environment's own" if argument == "disturbances" else repr(default))
         console.print(table)
-    _line(console, BATCH)
+    _about_engines(console)
     console.print("Arguments, observation, action and reward are explained by help(gymnasium.make(...).unwrapped)")
 
 
@@ -140,7 +141,7 @@ def _summary(found: dict[str, Entries], console: Console) -> None:
     """Print the names of all entries, grouped where they are many."""
     environments = [{**entry, "engines": ", ".join(entry["engines"])} for entry in found["environments"]]
     _names(console, "Environments", _grouped(environments, "engines"))
-    _line(console, BATCH)
+    _about_engines(console)
     _names(console, "Scenarios", _grouped(found["scenarios"], "environment"))
     _names(console, "Controllers", {"": _of(found["controllers"])})
     _names(console, "Disturbances", {"": _of(found["disturbances"])})
@@ -150,6 +151,12 @@ def _summary(found: dict[str, Entries], console: Console) -> None:
     _names(console, "Frontiers", {", ".join(places): [varied] for varied, places in frontiers.items()})
     console.print()
     console.print(f"For details: `artde-gym list` with one of {', '.join(TOPICS)}.")
+
+
+def _about_engines(console: Console) -> None:
+    _line(console, BATCH)
+    if missing := [name for name, spec in ENGINES.items() if spec.missing()]:
+        _line(console, f"Not installed here: {', '.join(missing)}. `artde-gym doctor` says why.")
 
 
 def _names(console: Console, title: str, groups: dict[str, list[str]]) -> None:

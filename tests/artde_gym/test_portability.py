@@ -136,6 +136,12 @@ def test_the_dependency_has_the_marker_of_the_wheels(
     assert wanted.marker.evaluate(here) == factory.has_wheel(implementation, version, system, machine)
 
 
+def test_listings_say_that_bullet_is_not_here(no_bullet: None) -> None:
+    for arguments in (["list"], ["list", "environments"]):
+        shown = " ".join(CliRunner().invoke(app, arguments).output.split())
+        assert "Not installed here: bullet. `artde-gym doctor` says why." in shown
+
+
 def test_records_and_the_first_line_name_the_engine(tmp_path: Path, no_bullet: None) -> None:
     outcome = CliRunner().invoke(
         app,
