@@ -31,7 +31,7 @@ class LawSpec:
             that it is like does.
 
     Raises:
-        OptionError: for a range that does not hold the default of its gain above zero.
+        OptionError: for a range of a gain without a default, or that does not hold the default above zero.
     """
 
     law: Law
@@ -47,7 +47,9 @@ class LawSpec:
         defaults = {} if self.gains is None else {one.name: one.default for one in dataclasses.fields(self.gains)}
         for gain, (low, high) in self.ranges.items():
             default = defaults.get(gain)
-            if not (isinstance(default, (int, float)) and 0 < low <= default <= high):
-                raise OptionError(
-                    f"range of {gain!r}", (low, high), f"above 0, about the default of the gain, {default!r}"
-                )
+            if not isinstance(default, (int, float)):
+                further = [name for name, value in defaults.items() if isinstance(value, (int, float))]
+                todo = f"only gains whose default is a number have one here: {', '.join(further) or 'none has'}"
+                raise OptionError(f"range of {gain!r}", (low, high), todo, "is of a gain without a default")
+            if not 0 < low <= default <= high:
+                raise OptionError(f"range of {gain!r}", (low, high), f"above 0, about the gain's default, {default:g}")

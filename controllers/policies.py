@@ -111,7 +111,8 @@ class Policy(abc.ABC):
             residual: du (..., n), added to the law's desired acceleration; zero is the same as none, bit for bit.
 
         Raises:
-            OptionError: if the observation's last axis is not as long as the environment's.
+            OptionError: if the observation's last axis is not as long as the environment's, or the law's first force
+                has not one component an actuator.
         """
         del deterministic
         xp = namespace(observation) if self.any_library else np
@@ -119,6 +120,7 @@ class Policy(abc.ABC):
         if given.shape[-1:] != (self._size,):
             raise OptionError("shape of the observation", given.shape, f"(..., {self._size})")
         signals = self.read(given)
+        begins = state is None
         if state is None:
             state = self.start(signals)
         elif episode_start is not None:
@@ -128,6 +130,8 @@ class Policy(abc.ABC):
         if residual is not None:
             signals = self.with_residual(signals, xp.asarray(residual, dtype=given.dtype))
         force, state = self.step(state, signals, given)
+        if begins and tuple(force.shape) != (*given.shape[:-1], *self._low.shape):  # bounds would broadcast it
+            raise OptionError(f"shape of the force of {self.name!r}", tuple(force.shape), f"(..., {len(self._low)})")
         if xp is not np:
             low, high = (xp.asarray(bound, dtype=force.dtype) for bound in (self._low, self._high))
             return xp.minimum(xp.maximum(force, low), high), state

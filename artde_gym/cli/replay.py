@@ -69,7 +69,7 @@ def replay(
             )
         else:
             own = {"--env": env, "--engine": engine, "--disturbances": disturbances, "--env-kwargs": env_kwargs}
-            for option, value in {**own, "--gains": gains}.items():
+            for option, value in {**own, "--gains": gains, "--seed": seed or None}.items():
                 if value is not None:
                     raise OptionError(
                         option, value, "leave it out", "does not go with a folder, whose episodes stay as they were run"

@@ -88,10 +88,12 @@ def replay_folder(
     An episode whose motion is not stored is run again from its seed; a note says if it did not repeat.
 
     Raises:
-        StoreError: if the folder is none.
+        StoreError: if the folder is none, or has no episode yet.
         UnknownNameError, OptionError: for a scenario, a controller or an episode that it does not have.
     """
     archive = _Archive(Path(folder))
+    if not archive.scenarios:
+        raise StoreError("results folder", str(folder), "run the evaluation first", "has no finished episode")
     names = archive.scenarios if scenario is None else [scenario] if isinstance(scenario, str) else list(scenario)
     figures, notes = [], []
     for name in names:

@@ -25,6 +25,8 @@ SHOWN = 12
 """Ends of chains that an error lists."""
 GEAR_RATIO = 100.0
 """Of rotors in engines without armature: the larger, the less the carrying link's own rotation spins them."""
+RESOLVED = (1e-14, 1e9)
+"""Masses and moments (kg, kg m^2) of bodies that engines can move: MuJoCo takes none below 1e-15."""
 
 
 def manipulator(
@@ -238,10 +240,18 @@ def _locked(link: FileLink) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _check_moving(spec: RobotSpec, file: str) -> None:
+    low, high = RESOLVED
     for link in spec.joints:
         if not link.mass > 0:
             allowed = "an <inertial> with a mass above zero, of it or of a link fixed to it"
             raise RobotError(f"mass moved by joint {link.name!r} in {file}", link.mass, allowed)
+        smallest, _, largest = link.principal
+        if not (low <= min(link.mass, smallest) and max(link.mass, largest) <= high):
+            field, allowed = (
+                f"mass and moments moved by joint {link.name!r} in {file}",
+                f"{low:g} to {high:g} kg, kg m^2",
+            )
+            raise RobotError(field, (link.mass, *link.principal), allowed)
 
 
 def _each(armature: float | Sequence[float], joints: int) -> tuple[float, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import queue
 import time
 from collections.abc import Callable
 
@@ -42,10 +41,6 @@ def run(
 
 
 def obey(game: Game, server: Server) -> None:
-    """Carry out the orders that wait."""
-    while True:
-        try:
-            order = server.orders.get_nowait()
-        except queue.Empty:
-            return
-        game.do(order)
+    """Carry out the orders that wait; those that come meanwhile wait for the next round."""
+    for _ in range(server.orders.qsize()):
+        game.do(server.orders.get_nowait())  # no other thread takes any

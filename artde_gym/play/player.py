@@ -128,10 +128,7 @@ class Player:
 
     def sliders(self) -> dict[str, list[float]]:
         """Return initial value, bounds and current value of each gain that can be tuned."""
-        return {
-            gain: [*space, self.gains[gain] if isinstance(self.gains.get(gain), int | float) else space.initial]
-            for gain, space in self.ranges.items()
-        }
+        return {gain: [*space, _shown(self.gains.get(gain, space.initial))] for gain, space in self.ranges.items()}
 
     def _signals(self) -> list[float]:
         fields = self.plant.observation_layout.split(np.asarray(self._observation, np.float64)[None])
@@ -143,6 +140,12 @@ class Player:
             }
         found = {label: float(values[0]) for label, values in signals_of(fields, self._metrics)}
         return [found.get(label, float("nan")) for label in self.labels]
+
+
+def _shown(gain: Any) -> float:
+    """Return one number for a gain: the mean over joints, of a matrix that of its diagonal."""
+    values = np.asarray(gain, np.float64)
+    return float((values.diagonal() if values.ndim == 2 else values).mean())
 
 
 def _text(error: Exception) -> str:

@@ -64,11 +64,20 @@ class Record:
 
     def attach(self, payload: Mapping[str, Any], time: float) -> None:
         """Add a payload that is attached at a time (s)."""
-        self._payload = {**payload, "attach_time": time}
+        self._payload = self._as_sampled({**payload, "attach_time": time})
 
     def drop(self, time: float) -> None:
         """Release the payload at a time (s)."""
-        self._payload = {**parameters_of("payload", self._given.get("payload")), **self._payload, "detach_time": time}
+        given = parameters_of("payload", self._given.get("payload"))
+        self._payload = {**given, **self._payload, **self._as_sampled({"detach_time": time})}
+
+    def _as_sampled(self, payload: Mapping[str, Any]) -> dict[str, Any]:
+        """Return values of a payload so that sampling them takes as many random numbers as those that were given.
+
+        All else that is sampled, noise and wind too, is then what it was in this episode.
+        """
+        given = parameters_of("payload", self._given.get("payload"))
+        return {name: certain(value, given.get(name)) for name, value in payload.items()}
 
     def disturbances(self) -> dict[str, Any]:
         """Return all of them in the grammar."""
@@ -91,6 +100,20 @@ class Record:
             last["force"], last["end"] = text["force"], text["end"]
         else:
             self._shown.append(text)
+
+
+def certain(value: Any, given: Any) -> Any:
+    """Return a value, as a distribution of that value alone where a distribution was given."""
+    if isinstance(given, list | tuple) and isinstance(value, list | tuple):
+        return [certain(*pair) for pair in zip(value, given, strict=True)]
+    if not isinstance(given, Mapping):
+        return value
+    ((kind, arguments),) = given.items()
+    if kind == "normal":  # exact unless the given one was truncated, which takes further random numbers
+        return {kind: [value, 0.0]}
+    if kind == "uniform":
+        return {kind: [value, value]}
+    return {kind: [value] * len(arguments)}
 
 
 def listed(given: Any) -> list[Any]:

@@ -80,6 +80,7 @@ class Server:
         port: port; 0 for any that is free, None for `PORT` or else any.
 
     Attributes:
+        host: as given.
         orders: of browsers, not yet checked.
         disturbances: function that returns what was done, for the file; set by `run`.
 
@@ -91,7 +92,7 @@ class Server:
         self.token, self._nonce = secrets.token_urlsafe(24), secrets.token_urlsafe(16)
         self.orders: queue.Queue[Mapping[str, Any]] = queue.Queue(MOST_ORDERS)
         self.disturbances: Callable[[], Mapping[str, Any]] = dict
-        self._host, self._page = host, live_page(self._nonce).encode()
+        self.host, self._page = host, live_page(self._nonce).encode()
         self._slots: dict[ServerConnection, _Slot] = {}
         self._lock, self._news = threading.Lock(), News()
         self._server = self._listening(port)
@@ -103,7 +104,7 @@ class Server:
         try:
             return serve(
                 self._watch,
-                self._host,
+                self.host,
                 PORT if port is None else port,
                 process_request=self._admit,
                 compression=None,
@@ -116,7 +117,7 @@ class Server:
         except OSError as error:
             if port is None:
                 return self._listening(0)
-            place = f"{self._host}:{port}"
+            place = f"{self.host}:{port}"
             raise OptionError(
                 "host and port", place, f"an address of this machine and a free port ({error})"
             ) from error
@@ -124,7 +125,7 @@ class Server:
     @property
     def loopback(self) -> bool:
         """True if no other machine can connect."""
-        return _is_loopback(self._host)
+        return _is_loopback(self.host)
 
     @property
     def watched(self) -> bool:
@@ -134,7 +135,7 @@ class Server:
     @property
     def address(self) -> str:
         """The address of the page, with its token."""
-        host = socket.gethostname() if self._host in ("0.0.0.0", "") else self._host
+        host = socket.gethostname() if self.host in ("0.0.0.0", "") else self.host
         return f"http://{host}:{self.port}/?token={self.token}"
 
     def tell(self, news: News) -> None:
@@ -152,9 +153,9 @@ class Server:
 
     def _admit(self, connection: ServerConnection, request: Request) -> Response | None:
         """Answer a request; None lets the WebSocket begin."""
-        path = urlsplit(request.path).path
         if not self._allowed(request):
             return _answer(connection, HTTPStatus.FORBIDDEN, "open the address that artde-gym play has printed")
+        path = urlsplit(request.path).path
         if path == "/":
             return self._sent(
                 self._page, "text/html; charset=utf-8", {"Content-Security-Policy": policy_of(self._nonce)}
@@ -172,9 +173,9 @@ class Server:
         hosts, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
         if len(hosts) != 1 or not self._is_here(hosts[0]) or len(origins) > 1:
             return False
-        if origins and (urlsplit(origins[0]).scheme, urlsplit(origins[0]).netloc) != ("http", hosts[0]):
-            return False
         try:
+            if origins and urlsplit(origins[0])[:2] != ("http", hosts[0]):
+                return False
             given = parse_qs(urlsplit(request.path).query, max_num_fields=8).get("token", [""])
         except ValueError:
             return False
@@ -188,7 +189,7 @@ class Server:
             return False
         if self.loopback or _is_loopback(name):
             return _is_loopback(name)
-        return _is_address(name) or name in (self._host.lower(), socket.gethostname().lower())
+        return _is_address(name) or name in (self.host.lower(), socket.gethostname().lower())
 
     def _sent(self, body: bytes, kind: str, more: Mapping[str, str]) -> Response:
         headers = {

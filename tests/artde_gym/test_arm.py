@@ -126,6 +126,14 @@ def test_the_tool_draws_a_figure_eight(tmp_path):
         np.testing.assert_allclose(found.q[400], found.q[800], atol=1e-12)
 
 
+def test_a_figure_eight_goes_through_a_home_of_zeros(tmp_path):
+    """Its middle is reached to rounding, and the search goes on from there."""
+    crane, time = read_arm(small_arm(tmp_path)), 0.01 * np.arange(601)
+    assert not home(crane).any()
+    place = Tool(crane).position(reference(crane, {"size": [0.15, 0.08], "period": 4.0}, time).q)
+    np.testing.assert_allclose(np.ptp(place[time >= RISE], axis=0), [0.0, 0.3, 0.16], atol=2e-4)
+
+
 @pytest.mark.parametrize(
     "given",
     [

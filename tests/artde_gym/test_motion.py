@@ -162,6 +162,17 @@ def test_what_a_folder_does_not_have_is_refused(flights, tmp_path):
             replay_folder(flights, **arguments)
     with pytest.raises(StoreError):
         replay_folder(tmp_path)
+    unfinished = shutil.copytree(flights, tmp_path / "unfinished")
+    (unfinished / "episodes.csv").unlink()
+    with pytest.raises(StoreError, match="has no finished episode"):
+        replay_folder(unfinished)
+
+
+@pytest.mark.parametrize(("option", "value"), [("--seed", "5"), ("--engine", "mujoco"), ("--gains", "{}")])
+def test_an_option_without_effect_on_a_folder_is_refused(flights, tmp_path, option, value):
+    answer = CliRunner().invoke(app, ["replay", str(flights), option, value, "--out", str(tmp_path / "x.html")])
+    assert isinstance(answer.exception, OptionError)
+    assert answer.exception.field == option
 
 
 def test_an_old_folder_is_run_again_and_what_does_not_repeat_is_said(flights, tmp_path):

@@ -108,6 +108,36 @@ def test_all_that_was_done_can_be_done_again(env):
     np.testing.assert_array_equal(both[-(len(alone) - 1) :], alone[1:])  # a push acts on each of them alone, too
 
 
+LEAVES: dict[str, Any] = {
+    "at a time": 3.0,
+    "uniformly": {"uniform": [3.0, 4.0]},
+    "normally": {"normal": [3.5, 0.1]},
+    "at one of three times": {"choice": [3.0, 3.5, 4.0]},
+}
+
+
+@pytest.mark.parametrize("leaves", LEAVES)
+def test_a_drop_in_place_of_a_sampled_one_leaves_all_other_samples(leaves):
+    payload = {"mass": {"uniform": [0.3, 0.4]}, "detach_time": LEAVES[leaves]}
+    wind = {"ambient": {"uniform": [0.5, 2.0]}}
+    game = flying(given={"payload": payload, "wind": wind, "sensor_noise": {"position": {"uniform": [0.0, 0.01]}}})
+    turns(game, 0.5)
+    assert order(game, do="drop") == ""
+    turns(game, 0.5)
+    assert told(game)["payload"] == "dropped"
+    assert again(game, ["artde"]).frame() == game.frame()
+
+
+def test_an_attached_payload_in_place_of_a_sampled_one_leaves_all_other_samples():
+    payload = {"mass": {"normal": [0.3, 0.01]}, "position": [0.0, {"uniform": [0.0, 0.01]}, -0.1], "detach_time": 0.0}
+    game = flying(given={"payload": payload, "wind": {"ambient": {"uniform": [0.5, 2.0]}}})
+    turns(game, 0.5)
+    assert order(game, do="attach", mass=0.2) == ""
+    turns(game, 0.5)
+    assert told(game)["payload"] == "held"
+    assert again(game, ["artde"]).frame() == game.frame()
+
+
 def test_a_payload_comes_and_goes():
     game = flying(given={})
     assert told(game)["payload"] == "none"
@@ -194,6 +224,20 @@ def test_gains_and_controllers_change_while_it_runs():
     assert told(game)["players"][0]["name"] == "tde"
     turns(game, 1.0)
     assert not game.over
+
+
+@pytest.mark.parametrize(
+    ("gain", "given", "shown"),
+    [
+        ("k_p", 30, 30.0),
+        ("k_p", 30.0, 30.0),
+        ("k_p", [20.0, 40.0] * 6, 30.0),
+        ("m_bar", np.diag([0.03, 0.05] * 6).tolist(), 0.04),
+    ],
+)
+def test_sliders_begin_at_the_gains_that_were_given(gain, given, shown):
+    game = walking(gains={"artde": {gain: given}})
+    assert told(game)["players"][0]["gains"][gain][3] == pytest.approx(shown)
 
 
 def test_a_second_controller_comes_and_goes():
@@ -370,10 +414,24 @@ class _Queue:
     def __init__(self, orders: Any) -> None:
         self._orders = list(orders)
 
+    def qsize(self) -> int:
+        return len(self._orders)
+
     def get_nowait(self) -> Any:
         if not self._orders:
             raise queue.Empty
         return self._orders.pop(0)
+
+
+def test_a_flood_of_orders_does_not_stop_the_simulation():
+    class Endless(_Queue):
+        def get_nowait(self) -> Any:
+            return {"do": "speed", "value": 1.0}  # and there is another one
+
+    game, server, rounds = flying(), deaf(), itertools.count()
+    server.orders = Endless([{}] * 3)
+    run(game, server, lambda: next(rounds) < 6, lambda: 0.0, lambda _: None)
+    assert game.time == pytest.approx(6 / RATE, abs=0.016)
 
 
 def test_a_slow_computer_takes_its_time_and_a_fast_one_waits():

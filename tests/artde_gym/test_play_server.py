@@ -108,6 +108,7 @@ STRANGERS = {
     "no host": ("?token={token}", (("Host", ""),)),
     "two hosts": ("?token={token}", (("Host", OWN), ("Host", "evil.example"))),
     "a host that is none": ("?token={token}", (("Host", "[::1"),)),
+    "an origin that is none": ("?token={token}", (("Origin", "http://[::1"),)),
 }  # fmt: skip
 
 
@@ -120,6 +121,10 @@ def test_strangers_get_403(server, stranger):
         status, _, body = get(server, path + query.format(**known), pairs)
         assert status == 403
         assert server.token.encode() not in body
+
+
+def test_a_path_that_cannot_be_read_gets_403(server):
+    assert get(server, f"//[::1/?token={server.token}")[0] == 403
 
 
 def test_strangers_get_no_socket(server):
@@ -270,7 +275,9 @@ def test_the_command_serves_until_it_is_interrupted(monkeypatch):
     assert met[0] in done.output.replace("\n", "")
     plain = CliRunner().invoke(app, [*words, "--no-browser"])
     assert "ssh -L" in plain.output
-    assert len(met) == 3
+    other = CliRunner().invoke(app, [*words, "--no-browser", "--host", "localhost"])
+    assert ":localhost:" in other.output.partition("ssh -L")[2]  # where it listens
+    assert len(met) == 4
 
 
 def test_an_interruption_waits_for_the_end_of_a_round(monkeypatch):

@@ -56,6 +56,15 @@ def leaky(gains, state, signals, period):
 
 LEAKY = LawSpec(Law(leaky_init, leaky), LeakyGains, "TDE that leaks", like="tde", ranges={"leak": (0.05, 5.0)})
 '''
+SHORT = """
+
+def short(gains, state, signals, period):
+    force, state = leaky(gains, state, signals, period)
+    return force[..., :1], state
+
+
+SHORT = LawSpec(Law(leaky_init, short), LeakyGains, "one component", like="tde")
+"""
 ROBOTS: dict[str, tuple[str, dict[str, Any]]] = {
     "ojas": ("BipedWalk-Payload-v0", {"duration": 0.2}),
     "q450": ("QuadInfinity-Payload-v0", {"duration": 0.3}),
@@ -141,7 +150,8 @@ def test_it_is_tuned_by_workers_and_a_folder_knows_its_code(law: Any, tmp_path: 
     ("before", "after", "words"),
     [
         ('like="tde"', 'like="tdo"', "law that 'mine' is like.*'tdo'.*did you mean 'tde'"),
-        ("leak: float = 0.5", "leak: float", "range of 'leak'"),
+        ("leak: float = 0.5", "leak: float", "range of 'leak'.*is of a gain without a default; only.*: none has"),
+        ('ranges={"leak"', 'ranges={"k_p"', "range of 'k_p'.*is of a gain without a default; only.*: leak"),
         ("leak: float = 0.5", "leak: float = 0.0", "range of 'leak'"),
         ('ranges={"leak"', 'ranges={"leek"', "range of 'leek'"),
         ("LeakyGains,", "None,", "range of 'leak'"),
@@ -157,6 +167,15 @@ def test_a_law_that_cannot_be_one_is_refused_at_once(monkeypatch, tmp_path, befo
     with pytest.raises(ArtdeGymError, match=words):
         controllers.register_law("mine", f"{name}:LEAKY")
     assert "mine" not in registration.registered_controllers()
+
+
+def test_a_law_of_one_component_too_few_is_refused_and_not_broadcast(monkeypatch, tmp_path) -> None:
+    (tmp_path / "short_law.py").write_text(LAW + SHORT)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(registration, "_controllers", dict(registration._controllers))
+    controllers.register_law("short", "short_law:SHORT")
+    with make_env("arm") as env, pytest.raises(OptionError, match=r"shape of the force of '.*' is \(1,\)"):
+        controllers.make("short", env).predict(env.reset(seed=0)[0])
 
 
 def test_further_gains_need_defaults_and_controllers_gains() -> None:

@@ -22,6 +22,7 @@ from artde_gym.robots.arm.tool import Tool
 KNOTS = 32  # of one round
 WEIGHT = 1e4  # 1/m, W: the tool misses its place by less than a micrometer
 MISSED = 1e-5  # m, by which it may miss a knot
+ZERO = 1e-6  # rad or m, below which a joint is at zero
 
 
 def figure_eight(
@@ -75,7 +76,15 @@ def _reached(tool: Tool, pose: Array, start: Array, place: Array, size: tuple[fl
     def slope(q: Array) -> Array:
         return np.concatenate([WEIGHT * tool.jacobian(q), np.eye(len(q))])
 
-    found = least_squares(miss, start, slope, method="lm", xtol=1e-12, ftol=1e-12, gtol=1e-12).x
-    if np.linalg.norm(tool.position(found) - place) > MISSED:
+    def searched(begin: Array) -> Array:
+        return least_squares(miss, begin, slope, method="lm", xtol=1e-12, ftol=1e-12, gtol=1e-12).x
+
+    def missed(q: Array) -> bool:
+        return bool(np.linalg.norm(tool.position(q) - place) > MISSED)
+
+    found = searched(start)
+    if missed(found):  # the first step is 100 times the joints: all but none where these are all but zero
+        found = searched(np.where(np.abs(start) < ZERO, 0.0, start))
+    if missed(found):
         raise OptionError("size of the reference", size, "a figure within the tool's reach around its pose")
     return found
