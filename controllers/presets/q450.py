@@ -105,8 +105,8 @@ Q450: dict[tuple[str, str], Preset] = {
     ),
     ("atde", "tuned"): Preset(
         _cascade(
-            AtdeGains(2.352, 58.71, 14.33, alpha=8.054, gamma_0=0.4826, c_floor=_FLOOR, c_start=_FLOOR, eps=_EPS),
-            AtdeGains(0.02842, 11.91, 3.25, alpha=10.11, gamma_0=2.228, c_floor=_FLOOR, c_start=_FLOOR, eps=_EPS),
+            AtdeGains(2.428, 42.26, 12.33, alpha=4.662, gamma_0=0.3975, c_floor=_FLOOR, c_start=_FLOOR, eps=_EPS),
+            AtdeGains(0.027, 14.9, 5.324, alpha=4.515, gamma_0=2.311, c_floor=_FLOOR, c_start=_FLOOR, eps=_EPS),
         ),
         _TUNED,
     ),
@@ -150,8 +150,8 @@ Q450: dict[tuple[str, str], Preset] = {
     ),
     ("geometric", "tuned"): Preset(
         _cascade(
-            PositionalPidGains(_MASS, 47.55, 10.53, k_i=52.06, integral_limit=20.0),
-            RigidAttitudeGains(375.8, 29.14, _INERTIA),
+            PositionalPidGains(_MASS, 56.35, 11.05, k_i=44.22, integral_limit=20.0),
+            RigidAttitudeGains(392.4, 40.25, _INERTIA),
             command="reference",
         ),
         _TUNED,
@@ -178,8 +178,8 @@ Q450: dict[tuple[str, str], Preset] = {
     ),
     ("indi", "tuned"): Preset(
         _cascade(
-            IndiGains(1.9, 24.18, 7.093, filter_rate=39.5, filter_damping=0.55),
-            IndiGains(_INERTIA, 358.1, 42.53, filter_rate=24.46, filter_damping=0.55),
+            IndiGains(2.062, 44.5, 12.74, filter_rate=148.0, filter_damping=0.55),
+            IndiGains(_INERTIA, 26.33, 41.83, filter_rate=52.4, filter_damping=0.55),
         ),
         _TUNED,
     ),
@@ -193,9 +193,9 @@ Q450: dict[tuple[str, str], Preset] = {
     ("asmc", "tuned"): Preset(
         _cascade(
             _sliding(
-                _MASS, 7.233, 0.5873, c_floor=0.02269, gamma_c=0.2714, eps=0.004199, gamma_r=4.56, gravity=GRAVITY
+                _MASS, 4.529, 0.3403, c_floor=2.209, gamma_c=0.07313, eps=0.04876, gamma_r=4.472, gravity=GRAVITY
             ),
-            _sliding(_INERTIA, 6.256, 19.49, c_floor=7.156, gamma_c=0.01001, eps=0.1863, gamma_r=0.0, gravity=0.0),
+            _sliding(_INERTIA, 12.26, 13.24, c_floor=1.519, gamma_c=0.2084, eps=0.02538, gamma_r=0.0, gravity=0.0),
         ),
         _TUNED,
     ),
