@@ -305,3 +305,13 @@ def test_files_that_a_page_names_exist(name):
 @pytest.mark.parametrize("name", WHOLE.commands)
 def test_the_list_of_commands_shows_whole_sentences(name):
     assert not WHOLE.commands[name].get_short_help_str(SHORTEST).endswith("...")
+
+
+@pytest.mark.parametrize("name", ["README", "use.md", "index.md", "tutorials/first-run.md", "tutorials/multiverse.md"])
+def test_a_walk_of_a_first_example_takes_steps(name):
+    text = README if name == "README" else PAGES[name]
+    walks = [part for part in text.split("\n\n") if re.search(r"Biped|S[12]\b", part) and "duration" in part]
+    times = [float(time) for part in walks for time in re.findall(r"duration\W+(\d+\.?\d*)", part)]
+    walked = [time for time in times if time > 1.0]  # the others are pushes
+    assert walked
+    assert min(walked) >= 5.0  # s: it stands for two at either end
