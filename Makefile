@@ -99,7 +99,7 @@ $(VENV)/core: pyproject.toml constraints.txt
 	@touch $@
 
 $(VENV)/docs: $(VENV)/core
-	@echo "artde-gym: installing the extra docs into .venv"
+	@echo "artde-gym: installing the extra docs into $(VENV)"
 	@$(INSTALL) --editable '.[docs]'
 	@touch $@
 

@@ -94,6 +94,7 @@ class WorkerError(ArtdeGymError):
 
 def suggest_names(name: object, known: Collection[str]) -> str:
     """Return the known names as one text, with the closest match as a suggestion."""
-    close = difflib.get_close_matches(str(name), known, n=1)
+    alike = [one for one in known if one.casefold() == str(name).casefold()]
+    close = alike or difflib.get_close_matches(str(name), known, n=1)
     hint = f" (did you mean {close[0]!r}?)" if close else ""
     return ", ".join(sorted(known)) + hint

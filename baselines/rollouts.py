@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.buffers import RolloutBuffer
 
 OPEN = 0.05  # of the gate; a shut one would be 0, were the normalizer not still moving
-KEPT = 5  # one in so many of the others is learnt from, for the values there
+KEPT = 5  # one in so many of the others is learned from, for the values there
 
 
 class OpenRollouts(RolloutBuffer):

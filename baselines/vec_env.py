@@ -26,7 +26,7 @@ Float = NDArray[np.float32]
 class ResidualVecEnv(VecEnv):
     """`ResidualEnv` for all robots of one vector environment; one step is one decision of each.
 
-    An episode that ends begins anew with the next decision, as Stable-Baselines3 expects; its last observation is in
+    An episode that ends restarts with the next decision, as Stable-Baselines3 expects; its last observation is in
     `infos[i]["terminal_observation"]`.
 
     Args:

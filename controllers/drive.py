@@ -35,7 +35,7 @@ class Drive:
         ranges: law -> ranges in which tuning searches its gains.
         make: builds its policies, called as make(env, law=..., **options); None for one law on all joints, see
             `controllers.joint_space.make_joint_space`.
-        feedback: returns k_p and k_d of computed torque for an environment; None for the preset's.
+        feedback: returns k_p and k_d as designed for an environment; None for the preset's.
         period: sampling period of its environments where nothing else is asked for (s).
         loops: for `artde-gym design`: lists its parts, each with its inertia along the reference, which the keyword
             arguments describe; None if the robot has no such model.

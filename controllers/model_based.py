@@ -12,7 +12,8 @@ from controllers.law_table import Nothing
 from controllers.laws.computed_torque import ComputedTorqueGains, computed_torque
 from controllers.laws.tracking import Array, JointInput, LawState
 from controllers.policies import ControlInterface, TrackingPolicy
-from controllers.presets import gain_ranges, preset_gains
+from controllers.presets import preset_gains
+from controllers.robots import tuning_space as ranges_for_robot
 
 
 class ComputedTorquePolicy(TrackingPolicy):
@@ -61,4 +62,4 @@ def make_computed_torque(env: Any, *, preset: str | None = None, **gains: Any) -
 
 def tuning_space(env: Any) -> dict[str, GainRange]:
     """Return the ranges in which tuning searches the gains."""
-    return gain_ranges(ControlInterface.of(env).robot, "computed-torque", None)
+    return ranges_for_robot(env, law="computed-torque")

@@ -32,7 +32,16 @@ def make_for_robot(env: Any, *, law: str, **options: Any) -> Policy:
 def tuning_space(env: Any, *, law: str, preset: str | None = None) -> dict[str, GainRange]:
     """Return the ranges in which tuning searches a law's gains for the robot of an environment.
 
+    They begin at the gains of the preset, or at those that the robot's drive designs for the environment.
+
     Raises:
         UnknownNameError: for a law or preset that the robot does not have, or a law without tuning ranges.
     """
-    return gain_ranges(ControlInterface.of(env).robot, law, preset)
+    robot = ControlInterface.of(env).robot
+    ranges = gain_ranges(robot, law, preset)
+    design = DRIVES[robot].feedback
+    for name, gain in ({} if design is None else design(env)).items():  # not those of the preset's robot and period
+        if name in ranges:
+            _, low, high = ranges[name]
+            ranges[name] = GainRange(gain, min(low, gain), max(high, gain))
+    return ranges

@@ -288,3 +288,30 @@ def test_an_arm_under_its_exact_model_obeys_the_designed_error():
     coarse, fine = (np.abs(simulate(modeled(arm), gains, arm, period).e).max() for period in (0.004, 0.001))
     assert fine < 5e-4
     assert coarse / fine == pytest.approx(4.0, rel=0.1)
+
+
+SHORTEST = 61  # characters of a description in a terminal of 80
+PATH = re.compile(r"`((?:[\w.-]+/)+[\w.-]+\.(?:py|md|ya?ml|toml|txt|css|js|mjs))`")
+MADE = ("runs/", "site/", "gallery/")  # by commands that a page shows
+
+
+@pytest.mark.parametrize("name", [*PAGES, "README"])
+def test_files_that_a_page_names_exist(name):
+    text = README if name == "README" else PAGES[name]
+    named = {path for path in PATH.findall(text) if not path.startswith(MADE)}
+    assert not [path for path in named if not (ROOT / path).exists() and not (ROOT / "docs" / path).exists()]
+
+
+@pytest.mark.parametrize("name", WHOLE.commands)
+def test_the_list_of_commands_shows_whole_sentences(name):
+    assert not WHOLE.commands[name].get_short_help_str(SHORTEST).endswith("...")
+
+
+@pytest.mark.parametrize("name", ["README", "use.md", "index.md", "tutorials/first-run.md", "tutorials/multiverse.md"])
+def test_a_walk_of_a_first_example_takes_steps(name):
+    text = README if name == "README" else PAGES[name]
+    walks = [part for part in text.split("\n\n") if re.search(r"Biped|S[12]\b", part) and "duration" in part]
+    times = [float(time) for part in walks for time in re.findall(r"duration\W+(\d+\.?\d*)", part)]
+    walked = [time for time in times if time > 1.0]  # the others are pushes
+    assert walked
+    assert min(walked) >= 5.0  # s: it stands for two at either end

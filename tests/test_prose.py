@@ -13,7 +13,8 @@ from documentation.pages import ROOT
 PACKAGES = ("artde_gym", "controllers", "baselines", "scripts")
 OPENINGS = re.compile(r"(What|Whether|Those|Where|How|Who|Which)\b(?![^.]*\?)")  # a question may open so
 WORDS = re.compile(
-    r"\b(nobody|likewise|as of(?! (CPython|MuJoCo|NumPy|\d))|the latter|the former|of ours|look on|anybody's)\b",
+    r"\b(nobody|likewise|as of(?! (CPython|MuJoCo|NumPy|\d))|the latter|the former|of ours|look on|anybody's|"
+    r"begins? anew|learnt|\w*(factor|raster)is(e|ed|es|er|ing|ation))\b",  # British, unknown to codespell
     re.IGNORECASE,
 )
 MODULES = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]

@@ -27,7 +27,7 @@ def benchmark(
         Path | None, typer.Option("--page", help="Write a page like docs/benchmark.md to this file.")
     ] = None,
 ) -> None:
-    """Measure speed and memory of environments and controllers as ratios; takes some minutes."""
+    """Measure speed and memory, as ratios; takes some minutes."""
     from artde_gym.benchmark.page import page, record  # heavy: only when the command runs
 
     console = terminal()

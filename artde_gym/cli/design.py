@@ -15,7 +15,7 @@ from artde_gym.arguments import check_number
 from artde_gym.cli.arguments import WALK, EnvKwargs, joined, json_object
 from artde_gym.cli.display import terminal
 from artde_gym.cli.workspace_design import show_workspace
-from artde_gym.errors import OptionError
+from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from artde_gym.evaluation.environments import robot_of
 from artde_gym.evaluation.fitting_table import FittingTable
 from artde_gym.files import check_figure, write_atomically
@@ -33,7 +33,7 @@ NAMES = [robot for robot in designed() if robot in ROBOTS]
 
 
 def design(
-    robot: Annotated[str | None, typer.Option(help=f"{' or '.join(NAMES)}. Default: that of {WALK}.")] = None,
+    robot: Annotated[str | None, typer.Option(help=f"{', '.join(NAMES)}. Default: that of {WALK}.")] = None,
     env: Annotated[str | None, typer.Option(help="Environment id, in place of the robot.")] = None,
     env_kwargs: EnvKwargs = None,
     law: Annotated[str, typer.Option(help=f"{', '.join((*DELAYED, *SWITCHED))}, or your own.")] = "tde",
@@ -48,7 +48,7 @@ def design(
     motion: Annotated[str | None, typer.Option(help="JSON; arguments of another robot's motion.")] = None,
     cap: Annotated[
         float | None,
-        typer.Option(help="Laws that switch: largest eigenvalue of what is derived (kg m^2). Default: 0.09."),
+        typer.Option(help="Laws that switch: bound of the derived inertias' eigenvalues (kg m^2). Default: 0.09."),
     ] = None,
     figure: Annotated[
         Path | None,
@@ -59,12 +59,16 @@ def design(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Print the valid range of m_bar, the joint stiffness K_d m_bar / L, and the margin to the limit.
+    """Print the valid range of m_bar and the joint stiffness.
+
+    The stiffness is K_d m_bar / L; the margin to the limit stands beside it.
 
     Of a law that switches with the support phase, print the range of each phase; --json holds, as "gains", the nominal
     inertias that follow from the robot's spec and gait.
     """
     name = _robot(robot, env)
+    if law not in (able := [*delayed(), *switched()]):
+        raise UnknownNameError("law with a time-delay estimate", law, suggest_names(law, able))
     switches = law in switched()
     _refuse_idle(switches, period, cap, figure)
     if period is not None:

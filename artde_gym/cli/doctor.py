@@ -24,7 +24,10 @@ def doctor(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Check your installation and suggest fixes; the exit code is 1 if a required check fails."""
+    """Check your installation and suggest fixes.
+
+    The exit code is 1 if a required check fails.
+    """
     console = terminal()
     found: dict[str, Report] = {}
     start = time.monotonic()

@@ -68,7 +68,10 @@ def evaluate(
     pictures: Pictures = False,
     videos: Videos = False,
 ) -> None:
-    """Compare controllers on the same seeded episodes and with the thesis."""
+    """Compare controllers on the same seeded episodes.
+
+    The tables show the thesis' numbers beside those measured.
+    """
     from artde_gym.evaluation import evaluate as run_evaluation  # heavy: only when the command runs
     from artde_gym.evaluation.console import print_result
 

@@ -30,7 +30,10 @@ def list_everything(
     name: Annotated[str | None, typer.Option(help="Comma-separated entries of the topic.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON.")] = False,
 ) -> None:
-    """List environments, scenarios, controllers with their gains, disturbances with their schemas, and frontiers."""
+    """List environments, scenarios, controllers, disturbances.
+
+    A topic shows them in full: the ranges of gains, the schemas of disturbances, the standard frontiers.
+    """
     if topic is not None and topic not in TOPICS:
         raise UnknownNameError("topic", topic, suggest_names(topic, TOPICS))
     if name is not None and topic is None:
@@ -56,13 +59,18 @@ def _chosen(entries: Entries, topic: str, wanted: list[str]) -> Entries:
     return [entry for entry in entries if entry["name"] in wanted]
 
 
+def _in_engines(entry: dict[str, Any]) -> str:
+    """Return where an environment runs as words; nothing for one without an engine of this project."""
+    return f" in {', '.join(entry['engines'])}" if entry["engines"] else ""
+
+
 def _table(title: str, *columns: str) -> FittingTable:
     return FittingTable(*columns, title=title, title_style="bold")
 
 
 def _environments_in_full(entries: Entries, console: Console) -> None:
     for entry in entries:
-        table = _table(f"{entry['name']}: {entry['robot']} in {', '.join(entry['engines'])}", "argument", "default")
+        table = _table(f"{entry['name']}: {entry['robot']}{_in_engines(entry)}", "argument", "default")
         for argument, default in entry["arguments"].items():
             table.add_row(argument, "the environment's own" if argument == "disturbances" else repr(default))
         console.print(table)
@@ -74,7 +82,7 @@ def _scenarios_in_full(entries: Entries, console: Console) -> None:
     for entry in entries:
         _head(console, entry["name"], entry["text"])
         beside = "" if entry["thesis"] is None else f"; the thesis' {entry['thesis']}"
-        _line(console, f"{entry['environment']} in {', '.join(entry['engines'])}{beside}")
+        _line(console, f"{entry['environment']}{_in_engines(entry)}{beside}")
         _line(console, f"arguments: {json.dumps(entry['arguments'])}")
         _line(console, f"disturbances: {json.dumps(entry['disturbances'])}")
 

@@ -25,7 +25,10 @@ def multiverse(
     allow_mixed: AllowMixed = False,
     report: Report = False,
 ) -> None:
-    """Judge claims over plausible worlds that all controllers meet; the same command continues."""
+    """Judge claims over plausible worlds.
+
+    All controllers meet the same worlds. Re-run the command to resume.
+    """
     from artde_gym.studies import multiverse as run_multiverse  # heavy: only when the command runs
     from artde_gym.studies.multiverse.console import print_multiverse
 

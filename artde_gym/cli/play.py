@@ -49,7 +49,10 @@ def play(
     ] = "127.0.0.1",
     browser: Annotated[bool, typer.Option(help="Open a browser, where there is one.")] = True,
 ) -> None:
-    """Watch controllers live in a browser: push the robot, drop its payload, change gains, and save what you did."""
+    """Watch and push the robot live in a browser.
+
+    Also drop its payload, change gains, compare two controllers, and save what you did for `evaluate`.
+    """
     try:
         from artde_gym.play.server import Server  # only when asked for
     except ModuleNotFoundError as error:

@@ -44,7 +44,10 @@ def replay(
         str | None, typer.Option(help="Address of a viewer that several files share. Default: one in the file.")
     ] = None,
 ) -> None:
-    """Write episodes of a folder, or of a new run, as one HTML file in which a browser shows them."""
+    """Write an interactive replay of episodes as one HTML file.
+
+    The episodes are those of a results folder, or of a new run. A browser shows them without a network.
+    """
     from artde_gym.evaluation.replay import replay as run_replay  # only when asked for
     from artde_gym.evaluation.replay import replay_folder
 

@@ -20,7 +20,10 @@ def report(
     pictures: Pictures = False,
     videos: Videos = False,
 ) -> None:
-    """Write report.html into a results folder, finished or not; the file works offline."""
+    """Write report.html into a results folder.
+
+    The run may be unfinished; the file works offline.
+    """
     show_report(folder, terminal(), pictures=pictures, videos=videos)
 
 

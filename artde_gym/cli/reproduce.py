@@ -44,7 +44,10 @@ def reproduce(
     pictures: Pictures = False,
     videos: Videos = False,
 ) -> None:
-    """Run the thesis' scenarios, compare its tables with the results, and judge each of its claims."""
+    """Run the thesis' scenarios and judge each of its claims.
+
+    The thesis' tables are printed beside those measured. Re-run the command to resume.
+    """
     from artde_gym.evaluation.console import print_claims, print_result  # heavy: only when the command runs
     from artde_gym.studies import reproduce as run_reproduction
     from artde_gym.studies.frontier.console import print_frontier

@@ -37,7 +37,9 @@ def train(
     action_mode: Annotated[
         str, typer.Option(help="Meaning of an action. Default: the robot's; see the model cards.")
     ] = "",
-    action_scale: Annotated[float, typer.Option(help="Largest residual. Default: the action mode's.")] = 0.0,
+    action_scale: Annotated[
+        float, typer.Option(help="Largest residual. Default: the action mode's.", show_default=False)
+    ] = 0.0,
     channel: Annotated[str | None, typer.Option(hidden=True)] = None,
     limit: Annotated[float | None, typer.Option(hidden=True)] = None,
     gated: Annotated[bool, typer.Option(help="Fade the biped's residual in by tilt and velocity error.")] = True,

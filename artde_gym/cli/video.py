@@ -42,7 +42,10 @@ def video(
     env_kwargs: EnvKwargs = None,
     gains: Gains = None,
 ) -> None:
-    """Make a video of an episode of `evaluate` with one or several controllers side by side."""
+    """Make a video of one episode, controllers side by side.
+
+    The episode is that of `evaluate` with the same seed.
+    """
     from artde_gym.video import video as make_video  # only when asked for
 
     console = terminal()

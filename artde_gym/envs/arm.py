@@ -13,6 +13,7 @@ from artde_gym.arguments import known_arguments
 from artde_gym.arrays import Array
 from artde_gym.envs.documentation import filled
 from artde_gym.envs.joint_env import JointEnv
+from artde_gym.metrics_spec import MetricsSpec
 from artde_gym.motion.motion import Pose
 from artde_gym.multibody.manipulator import TOOL
 from artde_gym.robots.arm import task
@@ -92,6 +93,16 @@ class ArmTrackEnv(JointEnv[task.Tracking]):
         super().__init__(tracking, disturbances, engine=engine, camera=camera, render_mode=render_mode)
         self._effort = np.array(spec.torque_limits)
         self._limits, self._frames = task.Limits(spec), frame_angles(spec)
+
+    @staticmethod
+    def metrics_spec_with(arguments: Mapping[str, Any]) -> MetricsSpec:
+        """Return the metrics of the arm that these arguments choose.
+
+        Raises:
+            OptionError, RobotError: for an arm that there is not.
+        """
+        chosen = {name: arguments[name] for name in ("robot", "tip", "armature", "joints") if name in arguments}
+        return task.metrics_spec(task.arm(**chosen))
 
     def pose(self) -> Pose:
         """Read where arm and payload are; joints as `artde_gym.robots.arm.scene` counts them."""

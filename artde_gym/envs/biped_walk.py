@@ -16,7 +16,7 @@ class BipedWalkPayloadEnv(BipedEnv):
     """Ojas, a 20-joint humanoid of 8.986 kg and 0.94 m, walks with a payload on its torso.
 
     ## Description
-    A walking pattern (stand 2 s, walk, stop) is the reference of the twelve leg joints; the policy commands their
+    A walking pattern (stand 2 s, walk, stand 2 s) is the reference of the twelve leg joints; the policy commands their
     torques. The policy does not observe payload, pushes and friction. After section 2.5 of Dantu, *Adaptive Artificial
     Time Delay Control for Robotic Systems* (2023); the robot's mass distribution and the pattern are this project's.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -90,11 +91,12 @@ class _Tables:
         title = Text(scenario if entry is None else f"{scenario}: {entry.text}", style="bold")
         rows = [self._result.rows(scenario, controller) for controller in self._controllers]
         count = max(map(len, rows))
-        note = f"{count} seeded episode{'s' if count > 1 else ''} a controller; mean, change with its 95 % interval"
+        note = f"{count} seeded episode{'s' if count > 1 else ''} per controller; mean, change with its 95 % interval"
         if table := thesis.reported(reference).table:
             note += f"; thesis: {table}"
         parts: list[RenderableType] = [title, Text(note, style="dim"), self._falls(scenario, reference)]
-        tracking = metrics_spec_of(pd.concat(rows)["env"].iloc[0])
+        episodes = pd.concat(rows)
+        tracking = _measured_axes(metrics_spec_of(episodes["env"].iloc[0]), episodes)
         own = [name for name in METRICS if name in self._result.metrics]
         for metric, what, axes in measured(tracking, () if entry is None else entry.phases, own):
             parts += self._metric(scenario, reference, metric, what, axes)
@@ -173,6 +175,23 @@ class _Tables:
         return [table] if table.row_count else []
 
 
+def _measured_axes(spec: MetricsSpec, episodes: pd.DataFrame) -> MetricsSpec:
+    """Return a spec with the axes that the episodes have: an arm from a file has other joints than the built-in one."""
+    columns = [str(name) for name in episodes.columns[episodes.notna().any()] if name not in METRICS]
+
+    def axes(prefix: str) -> dict[str, int]:
+        names = [name.removeprefix(prefix) for name in columns if name.startswith(prefix)]
+        return {name: number for number, name in enumerate(names) if not name.startswith("phase")}
+
+    errors = [dataclasses.replace(one, axes=axes(f"rmse_{one.unit}_")) for one in spec.errors]
+    efforts = [dataclasses.replace(one, axes=axes(f"rms_{one.name}_{one.unit}_")) for one in spec.efforts]
+    return dataclasses.replace(
+        spec,
+        errors=tuple(one for one in errors if one.axes) or spec.errors,
+        efforts=tuple(one for one in efforts if one.axes),
+    )
+
+
 def measured(
     tracking: MetricsSpec, phases: Sequence[tuple[float, float]], registered: Sequence[str] = ()
 ) -> list[tuple[str, str, list[str]]]:
@@ -224,7 +243,7 @@ def _comparison(row: Mapping[str, float]) -> str:
     if row["pairs"] == 0:
         return "no pair without a fall"
     scale = row["percent"] / row["difference"] if row["difference"] else 0.0
-    return f"{row['percent']:+.1f} {_span(*sorted((scale * row['low'], scale * row['high'])), digits=0)}"
+    return f"{row['percent']:+z.1f} {_span(*sorted((scale * row['low'], scale * row['high'])), digits=1)}"
 
 
 def _change(reference: str | None, metric: str, axis: str, rival: str) -> str:
@@ -233,7 +252,7 @@ def _change(reference: str | None, metric: str, axis: str, rival: str) -> str:
 
 
 def _span(low: float, high: float, digits: int) -> str:
-    return f"({low:.{digits}f}..{high:.{digits}f})" if math.isfinite(low) else ""
+    return f"({low:z.{digits}f}..{high:z.{digits}f})" if math.isfinite(low) else ""
 
 
 def _number(value: float | None, digits: int) -> str:

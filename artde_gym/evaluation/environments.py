@@ -38,13 +38,20 @@ def arguments_of(env_id: str, vectorized: bool = False) -> Mapping[str, inspect.
     return known
 
 
-def metrics_spec_of(env_id: str) -> MetricsSpec:
+def metrics_spec_of(env_id: str, kwargs: Mapping[str, Any] | None = None) -> MetricsSpec:
     """Return the metrics of an environment of this project.
+
+    Args:
+        env_id: its id.
+        kwargs: its arguments, on which its axes may depend: an arm has the joints of its file. None for the defaults.
 
     Raises:
         OptionError: for any other environment.
+        RobotError: for a robot's file that cannot be read.
     """
-    return _class(env_id).metrics_spec
+    creator = _class(env_id)
+    given = getattr(creator, "metrics_spec_with", None)
+    return creator.metrics_spec if given is None or kwargs is None else given(kwargs)
 
 
 def robot_of(env_id: str) -> str:

@@ -105,7 +105,7 @@ def replay_folder(
 
 def figure_of(cell: Cell, takes: Mapping[int, Sequence[Take]], ranks: Mapping[int, str]) -> dict[str, Any]:
     """Return what the viewer shows of a cell: takes by number of the episode, and how each one ranks."""
-    tracking = metrics_spec_of(cell.env_id)
+    tracking = metrics_spec_of(cell.env_id, cell.kwargs)
     entry = SCENARIOS.get(cell.name)
     chosen = styles(dict.fromkeys(take.name for several in takes.values() for take in several))
     episodes = [

@@ -123,7 +123,9 @@ def read_record(folder: Path) -> dict[str, Any]:
     Raises:
         StoreError: if there is none, or it is damaged.
     """
-    with wrap_read_errors("results folder", folder, "one that `evaluate` or `frontier` wrote", StoreError):
+    with wrap_read_errors(
+        "results folder", folder, "one that `evaluate`, `frontier`, `multiverse` or `train` wrote", StoreError
+    ):
         record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
         record["configuration"] = current_configuration(record["configuration"])
         wanted_episodes(record["configuration"])

@@ -140,7 +140,7 @@ class Game:
         return {**room, **self.given}
 
     def _restart(self, given: dict[str, Any]) -> None:
-        """Begin anew with other disturbances; refused ones leave the old ones."""
+        """Restart with other disturbances; refused ones leave the old ones."""
         before, self.given = self.given, given
         try:
             self._reset()
@@ -268,7 +268,7 @@ class Game:
         self._player(order).tune(order["gain"], order["value"])
 
     def _compare(self, order: Mapping[str, Any]) -> None:
-        """Put a second controller beside the first, or take it away, and begin anew."""
+        """Put a second controller beside the first, or take it away, and restart."""
         name, known = order["name"], registered_controllers()
         second = []
         if name is not None:

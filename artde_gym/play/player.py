@@ -49,7 +49,7 @@ class Player:
         self.plant = self._env.unwrapped
         if not hasattr(self.plant, "pose"):
             raise OptionError("env_id", cell.env_id, "an environment with a method `pose`, which a browser can show")
-        self._metrics = metrics_spec_of(cell.env_id)
+        self._metrics = metrics_spec_of(cell.env_id, cell.kwargs)
         self.labels = _labels(self._metrics)
         self._take(name, item, dict(gains))
 

@@ -78,7 +78,8 @@ class Run:
         return [name for name in self.record["configuration"].get("metrics", ()) if name in self.result.metrics]
 
     def tracking(self, scenario: str) -> MetricsSpec:
-        return metrics_spec_of(self.cell(scenario)["env_id"])
+        cell = self.cell(scenario)
+        return metrics_spec_of(cell["env_id"], cell["kwargs"])
 
     def episode(self, scenario: str) -> Episode | None:
         """Return the first episode with stored signals, of all controllers that have it."""

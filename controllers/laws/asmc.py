@@ -1,4 +1,4 @@
-"""Adaptive sliding-mode control (ASMC): no time-delay estimate; gain and inertia are learnt instead. This law is ours.
+"""Adaptive sliding-mode control (ASMC): no time-delay estimate; gain and inertia are learned instead. This law is ours.
 
     s   = ed + slope e
     u   = qdd_ref + slope ed + k_s s + c s / sqrt(|s|^2 + eps)

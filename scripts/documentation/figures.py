@@ -122,11 +122,11 @@ def pid() -> str:
 def positional_pid() -> str:
     runs = {"pid": lift("positional-pid", "pid", "tuned"), "tde": lift("tde")}
     needed = LIFT.load_weight / float(LIFT.inertia)
-    learnt, time = runs["pid"].inside["integral"][:, 0], runs["pid"].time
+    learned, time = runs["pid"].inside["integral"][:, 0], runs["pid"].time
     charts = {
         "error": errors(runs),
-        "what the integral has learnt": over_time(
-            "integral (m/s^2)", {"pid": (time, learnt - learnt[0])}, level=needed
+        "what the integral has learned": over_time(
+            "integral (m/s^2)", {"pid": (time, learned - learned[0])}, level=needed
         ),
     }
     caption = (
@@ -143,7 +143,7 @@ def asmc() -> str:
     charts = {
         "error": errors(runs),
         "switching gain c": over_time("c (m/s^2)", {"asmc": inside(runs["asmc"], "c")}),
-        "learnt mass over nominal mass": over_time("r (1)", {"asmc": ratio}, level=true),
+        "learned mass over nominal mass": over_time("r (1)", {"asmc": ratio}, level=true),
     }
     caption = f"{_lift()} RMS error {_values(runs)}. Dashed: the true ratio of masses with the load, {true:.3f}."
     return figure(caption, charts, styles(runs))

@@ -20,6 +20,8 @@ from controllers.presets import all_presets
 from documentation.replays import OF_ENVIRONMENTS
 
 ROOT = Path(__file__).parents[2]
+SLUNG = '{"mass": 0.3, "cable": 0.5}'
+"""The payload of an example in an environment whose payload hangs on a cable."""
 RAISES = re.compile(r"^Raises:\n((?:    .*\n?)+)", re.MULTILINE)
 EXAMPLE = """\
 ```python
@@ -27,7 +29,7 @@ import gymnasium as gym
 import artde_gym
 import controllers
 
-env = gym.make("{env_id}", duration=2.0, disturbances={{"payload": 0.3}})
+env = gym.make("{env_id}", duration=2.0, disturbances={{"payload": {payload}}})
 policy = controllers.make("artde", env)
 observation, info = env.reset(seed=0)
 action, state = policy.predict(observation)
@@ -72,7 +74,13 @@ def environment(env_id: str) -> str:
     spec, robot = gym.spec(env_id), robot_of(env_id)
     page = _page(load_env_creator(str(spec.entry_point)))
     shown = [f"<!-- replay: {OF_ENVIRONMENTS[env_id]} -->"] if env_id in OF_ENVIRONMENTS else []
-    parts = [f"# {env_id}", *shown, page, "## Example", EXAMPLE.format(env_id=env_id)]
+    parts = [
+        f"# {env_id}",
+        *shown,
+        page,
+        "## Example",
+        EXAMPLE.format(env_id=env_id, payload=SLUNG if "Sling" in env_id else 0.3),
+    ]
     scenarios = [
         f"| {entry.name} | {entry.text} | `{json.dumps(dict(entry.kwargs))}` |"
         for entry in SCENARIOS.values()
@@ -80,6 +88,7 @@ def environment(env_id: str) -> str:
     ]
     if scenarios:
         parts += ["## Scenarios", "\n".join(["| scenario | what it is | arguments |", "|---|---|---|", *scenarios])]
+        parts += ["`artde-gym list scenarios` shows the disturbances of each, with what varies from seed to seed."]
     parts += [
         "## Controllers",
         "Gains of the robot's presets. A controller's first preset is its default.",

@@ -29,10 +29,14 @@ _PHASES = ((0.0, GRASP), (GRASP, RELEASE), (RELEASE, 12.0))
 
 _SCENARIOS = (
     Scenario("A1", _TRACK, {}, _FRICTION, "pick and place without a load, friction +-30 %"),
-    Scenario("A2", _TRACK, {}, _LOADED, "A1 with a payload of 1.05 to 2.1 kg from 4 s to 8 s", phases=_PHASES),
-    Scenario("A3", _TRACK, {}, _PUSHED, "A2 with a push of 100 N on the tool", phases=_PHASES),
-    Scenario("A4", _TRACK, {"reference": MULTI_SINE}, _ENCODED, "two sines a joint, payload, encoders of 20 bits"),
-    Scenario("A5", _TRACK, _SLOW, _PUSHED, "A3 at L = 4 ms", phases=_PHASES),
+    Scenario(
+        "A2", _TRACK, {}, _LOADED, "pick and place with a payload of 1.05 to 2.1 kg from 4 s to 8 s", phases=_PHASES
+    ),
+    Scenario(
+        "A3", _TRACK, {}, _PUSHED, "pick and place with a payload and a push of 100 N on the tool", phases=_PHASES
+    ),
+    Scenario("A4", _TRACK, {"reference": MULTI_SINE}, _ENCODED, "two sines per joint, payload, encoders of 20 bits"),
+    Scenario("A5", _TRACK, _SLOW, _PUSHED, "pick and place with a payload and a push, L = 4 ms", phases=_PHASES),
 )
 
 _FRONTIER = FrontierTest(

@@ -56,9 +56,11 @@ _SCENARIOS = (
     Scenario("S1", _WALK, {}, _VARIATION, f"walk without payload, L = 1 ms; {_LEFT_OUT}", "S1"),
     Scenario("S2", _WALK, {}, _S2, f"walk with a payload of 1.3 kg, L = 1 ms; {_LEFT_OUT}", "S2"),
     Scenario("S3", _PUSH, {}, _S3, _PUSHES, "S3", _PHASES),
-    Scenario("S1-L4", _WALK, _SLOW, _VARIATION, "S1 at L = 4 ms: a quarter of the joint stiffness", "S1"),
-    Scenario("S2-L4", _WALK, _SLOW, _S2, "S2 at L = 4 ms", "S2"),
-    Scenario("S3-L4", _PUSH, _SLOW, _S3, "S3 at L = 4 ms", "S3", _PHASES),
+    Scenario(
+        "S1-L4", _WALK, _SLOW, _VARIATION, "walk without payload, L = 4 ms: a quarter of the joint stiffness", "S1"
+    ),
+    Scenario("S2-L4", _WALK, _SLOW, _S2, "walk with a payload of 1.3 kg, L = 4 ms", "S2"),
+    Scenario("S3-L4", _PUSH, _SLOW, _S3, "walk with a payload and the pushes of S3, L = 4 ms", "S3", _PHASES),
     *(_with_ground_force(name, percent) for name in ("S1", "S2", "S3") for percent in (33, 45, 50)),
 )
 

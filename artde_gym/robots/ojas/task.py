@@ -144,7 +144,7 @@ with a norm above 200 rad/s (`fell_speed`: the motion has diverged). *Truncated*
 | `self_collision` | False | False, True | whether the feet collide or overlap |
 | `speed` | 0.1 | 0 to 0.25 m/s | walking speed |
 | `step_duration` | 1.0 | 0.6 to 2 s | duration of one step |
-| `duration` | 58.0 | 0.1 to 1800 s | duration of the walk |
+| `duration` | 58.0 | 0.1 to 1800 s | duration of the walk; 2 s of standing at either end, so no step below 5 s |
 | `observe_ground_force` | False | False, True | append the ground's force on each foot to the observation |"""
 """Text of all pages, with `{observation}` and `{default}` to be filled in; further arguments follow."""
 

@@ -50,8 +50,15 @@ _SLUNG: dict[str, Any] = {
 
 _SCENARIOS = (
     Scenario("Q1", _INFINITY, {}, {**_FLIGHT, "wind": 1.0}, "infinity loops with a payload of 0.35 kg, wind", "Q1"),
-    Scenario("Q1-calm", _INFINITY, {}, _FLIGHT, "Q1 without wind"),
-    Scenario("Q1-gale", _INFINITY, {}, {**_FLIGHT, "wind": 2.0}, "Q1 in wind of twice the strength", "Q1"),
+    Scenario("Q1-calm", _INFINITY, {}, _FLIGHT, "infinity loops with a payload of 0.35 kg, no wind"),
+    Scenario(
+        "Q1-gale",
+        _INFINITY,
+        {},
+        {**_FLIGHT, "wind": 2.0},
+        "infinity loops with a payload of 0.35 kg, wind twice as strong",
+        "Q1",
+    ),
     Scenario(
         "Q-sling",
         _SLING,
@@ -59,20 +66,22 @@ _SCENARIOS = (
         {**_SLUNG, "wind": {"scale": 1.0, "fan_position": LIFTED_FAN}},
         "infinity loop with 0.35 kg on a cable of 0.5 m, wind; the load is kicked at 20 s and released at 35 s",
     ),
-    Scenario("Q-sling-calm", _SLING, {"duration": 45.0}, _SLUNG, "Q-sling without wind"),
+    Scenario(
+        "Q-sling-calm", _SLING, {"duration": 45.0}, _SLUNG, "infinity loop with a kicked load on a cable, no wind"
+    ),
     Scenario(
         "Q-sling-gale",
         _SLING,
         {"duration": 45.0},
         {**_SLUNG, "wind": {"scale": 2.0, "fan_position": LIFTED_FAN}},
-        "Q-sling in wind of twice the strength",
+        "infinity loop with a kicked load on a cable, wind twice as strong",
     ),
     Scenario(
         "Q-sling-late",
         _SLING,
         {"duration": 45.0},
         {**_SLUNG, "wind": {"scale": 1.0, "fan_position": LIFTED_FAN}, "cable_delay": {"steps": 4}},
-        "Q-sling with the cable measured 60 ms late",
+        "infinity loop with a kicked load on a cable, measured 60 ms late",
     ),
 )
 

@@ -31,8 +31,9 @@ from artde_gym.arguments import check_integer
 from artde_gym.deprecation import takes_old_names
 from artde_gym.errors import OptionError
 from artde_gym.evaluation import canonical
+from artde_gym.evaluation.cells import Cell, shared_kwargs
 from artde_gym.evaluation.columns import check_metric
-from artde_gym.evaluation.environments import metrics_spec_of, single, with_engine
+from artde_gym.evaluation.environments import metrics_spec_of, single, single_arguments, with_engine
 from artde_gym.evaluation.evaluate import run_plan
 from artde_gym.evaluation.gains import policy_for
 from artde_gym.evaluation.identity import behind
@@ -144,8 +145,13 @@ def tune(
         "seed": seed,
         **({} if metric is None else {"metric": metric}),
     }
-    store = None if out is None else TuningStore(Path(out), configuration, _behind(names, env_id), allow_mixed)
+    store = None if out is None else TuningStore(Path(out), configuration, _behind(names, plan.cells[0]), allow_mixed)
     return search.run(trials, held_out, store)
+
+
+def _tuned_env(cell: Cell) -> Any:
+    """Return an environment with a cell's arguments, on which presets depend where gains are designed."""
+    return single(cell.env_id, json.dumps(single_arguments(cell.env_id, shared_kwargs(cell))))
 
 
 def _names(controllers: Any) -> list[str]:
@@ -173,7 +179,8 @@ class _Search:
         self._plan, self._on_progress = plan, on_progress
         self._proposer = Proposer(plan.seed)
         self.metric = f"rmse_{metrics_spec_of(env_id).errors[0].unit}" if metric is None else metric
-        self.spaces = {name: tuning_space(name, single(env_id, json.dumps({}))) for name in plan.controllers}
+        env = _tuned_env(plan.cells[0])
+        self.spaces = {name: tuning_space(name, env) for name in plan.controllers}
 
     def run(self, trials: int, held_out: int, store: TuningStore | None) -> Tuning:
         """Run what a store does not contain yet; None to store nothing."""
@@ -218,12 +225,12 @@ class _Search:
         return self._on_progress and functools.partial(self._on_progress, what)
 
 
-def _behind(controllers: Sequence[str], env_id: str) -> dict[str, str]:
+def _behind(controllers: Sequence[str], cell: Cell) -> dict[str, str]:
     """Return hashes of the controllers' weights and code, at their own gains."""
-    known, env = registered_controllers(), single(env_id, json.dumps({}))
+    known, env = registered_controllers(), _tuned_env(cell)
     found: dict[str, str] = {}
     for name in controllers:
-        found |= behind(name, env_id, known[name], policy_for(known[name], env, {}))
+        found |= behind(name, cell.env_id, known[name], policy_for(known[name], env, {}))
     return found
 
 

@@ -34,3 +34,4 @@ for (const root of document.querySelectorAll(".live")) {
   root.live = new Live(root, drawn);
 }
 addEventListener("beforeprint", () => document.querySelectorAll(".replay[data-ready]").forEach((root) => root.replay.paint()));
+if (parent !== window) new ResizeObserver(() => parent.postMessage({ replayHeight: document.body.offsetHeight }, "*")).observe(document.body);  // a page fits its frame to it
