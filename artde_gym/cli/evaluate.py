@@ -33,7 +33,6 @@ from artde_gym.cli.arguments import (
 )
 from artde_gym.cli.display import Display, terminal
 from artde_gym.cli.report import show_report
-from artde_gym.evaluation.cells import CUSTOM
 from artde_gym.evaluation.environments import main_scenarios
 
 
@@ -70,6 +69,7 @@ def evaluate(
 ) -> None:
     """Compare controllers on the same seeded episodes and with the thesis."""
     from artde_gym.evaluation import evaluate as run_evaluation  # heavy: only when the command runs
+    from artde_gym.evaluation.cells import CUSTOM
     from artde_gym.evaluation.console import print_result
 
     vectorized = vectorized_by(vectorized, backend)
