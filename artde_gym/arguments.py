@@ -74,13 +74,13 @@ def check_bool(field: str, value: object) -> bool:
 
 
 def action_array(action: Any, size: int, allowed: str) -> NDArray[np.float64]:
-    """Return an action (size,) as floats.
+    """Return an action (size,) as floats: itself if it is an array of them, else a new array.
 
     Raises:
         ActionError: for a wrong shape or a value that is not a finite number; `allowed` describes valid values.
     """
-    if type(action) is np.ndarray and action.dtype == np.float64:  # the usual case, a microsecond faster
-        values = action.copy()
+    if type(action) is np.ndarray and action.dtype == np.float64:  # the usual case, and quick
+        values = action
     else:
         values = real_array("action", action, f"{size} numbers")
     if values.shape != (size,):

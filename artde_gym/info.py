@@ -46,7 +46,8 @@ class EpisodeInfo:
         """Return the `info` of a step from the terms of the reward, the events and which reasons for a fall hold."""
         info = self._still.copy()
         info["time_s"] = time
-        info.update(zip(self._rewards, terms.values(), strict=True))
+        for name, term in zip(self._rewards, terms.values(), strict=True):
+            info[name] = term
         for name, array in self._arrays:
             info[name] = array.copy()
         for name in events:

@@ -42,6 +42,8 @@ class LawPolicy(TrackingPolicy):
         return self._law.start(self.gains, signals, self._period)
 
     def step(self, state: Any, signals: JointInput, observation: Array) -> tuple[Array, LawState]:
+        if not self._further:  # of most laws; a microsecond faster
+            return self._law.step(self.gains, state, signals, self._period)
         further = (observation[..., part] for part in self._further)
         return self._law.step(self.gains, state, signals, self._period, *further)
 

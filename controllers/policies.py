@@ -179,7 +179,7 @@ class TrackingPolicy(Policy):
         self._parts = [(..., interface.observation[field]) for field in JointInput._fields]
 
     def read(self, observation: Array) -> JointInput:
-        return JointInput(*[observation[part] for part in self._parts])
+        return JointInput._make(map(observation.__getitem__, self._parts))
 
     def with_residual(self, signals: JointInput, du: Array) -> JointInput:
         return signals._replace(qdd_ref=signals.qdd_ref + du)

@@ -17,9 +17,6 @@ from artde_gym.kit import ROBOTS
 from artde_gym.registration import registered_controllers
 from artde_gym.scenarios import SCENARIOS
 from artde_gym.sim.factory import ENGINES
-from controllers.drive import DRIVES
-from controllers.presets import LOOPS, law_presets, named_gains
-from controllers.presets.units import unit_of
 
 Entries = list[dict[str, Any]]
 
@@ -58,6 +55,10 @@ def scenarios() -> Entries:
 
 def controllers() -> Entries:
     """Return every controller with the gains of its presets by robot."""
+    from controllers.drive import DRIVES  # with all laws behind it: only when it is asked for
+    from controllers.presets import LOOPS, law_presets, named_gains
+    from controllers.presets.units import unit_of
+
     found = []
     for name, spec in registered_controllers().items():
         law, wanted = spec.kwargs.get("law", name), spec.kwargs.get("preset")

@@ -58,6 +58,7 @@ class Schedule:
         self._pushes = [Push.of(entry, time_step) for entry in sampled.get("push", ())]
         self._payload: Mapping[str, Any] = sampled.get("payload", {})
         self._changes: dict[int, list[str]] = {}
+        self._quiet_from = self._quiet_until = 0  # nothing acts, begins or ends from the first of these steps on
         for push in self._pushes:
             self._announce(push)
         if self._payload and self._payload["detach_time"] > self._payload["attach_time"]:
@@ -96,10 +97,15 @@ class Schedule:
 
     def quiet(self, first: int, end: int) -> bool:
         """Return True if nothing acts, begins or ends in steps `first` to `end` - 1."""
-        return not self._changes or self.next(first) >= end
+        return self.next(first) >= end
 
     def next(self, step: int) -> int:
         """Return the first step from `step` on in which something acts, begins or ends; `NEVER` if there is none."""
+        if not self._quiet_from <= step < self._quiet_until:
+            self._quiet_from, self._quiet_until = step, self._find_next(step)
+        return self._quiet_until
+
+    def _find_next(self, step: int) -> int:
         if self.acting(step):
             return step
         return min((change for change in self._changes if change >= step), default=NEVER)  # every push begins and ends
@@ -132,4 +138,5 @@ class Schedule:
         self._add(push.end, PUSH_ENDS)
 
     def _add(self, step: int, event: str) -> None:
+        self._quiet_until = 0  # to be found again
         self._changes.setdefault(step, []).append(event)

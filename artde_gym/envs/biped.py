@@ -113,7 +113,7 @@ class BipedEnv(JointEnv[task.Walk]):
     def _place(self, sampled: Mapping[str, Any]) -> None:
         self._engine.restore_state(self._settled)
         self._task.set_up(self._engine, sampled)
-        self._high = task.torque_limit(sampled)
+        self._high = np.full(task.N_JOINTS, task.torque_limit(sampled))
         self._low = -self._high
         self._pulses = None
         if "grf_pulse" in sampled:
@@ -152,10 +152,10 @@ class BipedEnv(JointEnv[task.Walk]):
 
     def _observation(self) -> Array:
         state = self._state = self._engine.state()
-        loads = self._loads = self._engine.foot_loads()
+        left, right = self._loads = self._engine.foot_loads()
         self._tilt = roll_pitch(state.quat_xyzw, math.atan2, arcsine)
-        contact = [load > LOADED for load in loads]
-        plan = self._task.plan[self._k]
+        plan = self._plan = self._task.plan[self._k]
+        contact = (1.0 if left > LOADED else 0.0, 1.0 if right > LOADED else 0.0)
         base = (state.position[2], *self._tilt, *state.velocity, *state.angular_velocity, *contact)
         parts = [state.q, state.qd, plan[:-2], self._tau, base, plan[-2:]]
         if self.observe_ground_force:
@@ -163,7 +163,7 @@ class BipedEnv(JointEnv[task.Walk]):
         return np.concatenate(parts)
 
     def _reward_terms(self) -> dict[str, float]:
-        error = self._task.plan[self._k, : task.N_JOINTS] - self._state.q
+        error = self._plan[: task.N_JOINTS] - self._state.q
         tau, change = self._tau, self._tau - self._previous
         roll, pitch = self._tilt
         tilt = roll * roll + pitch * pitch

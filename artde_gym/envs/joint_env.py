@@ -90,9 +90,11 @@ class JointEnv(EngineEnv, Generic[Task]):
     def _simulate(self, command: Array) -> list[str]:
         engine, active, events = self._engine, self._active, []
         first = self.elapsed
+        end = first + self._substeps
         active.begin_period(command)
-        for step in range(first, first + self._substeps):
-            tau = active.apply(step, engine, events)
+        quiet = active.next_event_step(first) >= end
+        for step in range(first, end):
+            tau = command if quiet else active.apply(step, engine, events)
             engine.step(self._acting(tau, step) if self._loaded else tau)
         self._previous, self._tau = self._tau, active.applied()
         return events

@@ -61,8 +61,7 @@ class BaseEnv(InteractiveMixin, gym.Env[NDArray[Any], NDArray[Any]], abc.ABC):
         self.render_mode = render_mode
         self.observation_space, self.action_space = self.observation_layout.box(), self.action_layout.box()
         self._size = self.action_layout.size
-        self._low: Any = self.action_space.low  # an array, or one number
-        self._high: Any = self.action_space.high
+        self._low, self._high = self.action_space.low, self.action_space.high
         self.control_period, self._substeps, self._last = control_period, substeps, last
         self._k, self._over, self._closed = 0, True, False  # no step before the first reset
         self.schedule = Schedule({}, self.time_step)

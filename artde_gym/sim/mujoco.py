@@ -62,11 +62,11 @@ class MujocoEngine(MujocoWorld):
         self._fixed = spec.fixed
         self._pose, self._twist = data.qpos[:base_q], data.qvel[:base_v]
         self._pushes, self._pushed = data.xfrc_applied, False
-        self._forces = data.sensordata
+        self._forces, self._loads = data.sensordata, data.sensordata[2::3]
         self._fall: _Fall | None = None
         self._scratch = mj.MjData(model)
         self._snapshots: list[tuple[Array, Array, Array]] = []
-        self._canvas = Canvas(model) if renders else None
+        self._canvas = Canvas(spec) if renders else None
         self._shadow = Shadow(spec)
 
     def reset(self, position: Vector, q: Array) -> None:
@@ -120,7 +120,8 @@ class MujocoEngine(MujocoWorld):
         return State(q, qd, (x, y, z), quat, (vx, vy, vz), rotate((wx, wy, wz), quat))
 
     def step(self, tau: Array) -> None:
-        self._torque[self._joints] = tau
+        if self.spec.actuated:
+            self._torque[self._joints] = tau
         mj.mj_step(self._model, self._data)
         if self._pushed:
             self._pushes[:] = 0.0
@@ -139,7 +140,7 @@ class MujocoEngine(MujocoWorld):
         return self._data
 
     def foot_loads(self) -> tuple[float, ...]:
-        return tuple(self._forces[2::3].tolist())
+        return tuple(self._loads.tolist())
 
     def ground_forces(self) -> Array:
         return self._forces.reshape(-1, 3).copy()
@@ -188,10 +189,9 @@ class MujocoEngine(MujocoWorld):
 
     def render(self, camera: Camera, load: Vector | None = None) -> NDArray[np.uint8]:
         if self._canvas is None:
-            self._canvas = Canvas(self._model)
-        mj.mj_camlight(self._model, self.placed())
+            self._canvas = Canvas(self.spec)
         ball = self.payload_position() if load is None else load
-        picture, bare = self._canvas.draw(self._data, camera, ball)
+        picture, bare = self._canvas.draw(self._data.qpos, camera, ball)
         paint(picture, bare, camera, self._shadow.polygons(self.state(), ball))
         return picture
 

@@ -17,8 +17,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from artde_gym.arrays import Array
 from artde_gym.errors import OptionError
-from artde_gym.multibody.spec import Vector
+from artde_gym.multibody.mjcf import mjcf
+from artde_gym.multibody.spec import RobotSpec, Vector
 from artde_gym.sim.camera import Camera
 from artde_gym.sim.engine import PAYLOAD_COLOR, PAYLOAD_LOOK
 
@@ -30,14 +32,15 @@ _MAX_SHAPES = 1000  # most shapes in a scene
 
 
 class Canvas:
-    """A renderer of one model.
+    """A renderer of one robot, with a model of its own that has the shapes which physics do without.
 
     Raises:
         OptionError: if offscreen OpenGL is unavailable.
     """
 
-    def __init__(self, model: Any) -> None:
-        self._model = model
+    def __init__(self, spec: RobotSpec) -> None:
+        self._model = model = mj.MjModel.from_xml_string(mjcf(spec))
+        self._data = mj.MjData(model)
         self._context = context = _context()
         context.make_current()
         self._painter = mj.MjrContext(model, mj.mjtFontScale.mjFONTSCALE_100)
@@ -47,14 +50,17 @@ class Canvas:
         self._finalizer.atexit = False  # too late: EGL's display is closed by then
         atexit.register(self._finalizer)
 
-    def draw(self, data: Any, camera: Camera, ball: Vector | None) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+    def draw(self, qpos: Array, camera: Camera, ball: Vector | None) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
         """Render an image (height, width, 3), with the payload at `ball` (m), if any; also return its empty pixels."""
+        self._data.qpos[:] = qpos
+        mj.mj_kinematics(self._model, self._data)
+        mj.mj_camlight(self._model, self._data)
         scene, rect = self._scene, mj.MjrRect(0, 0, camera.width, camera.height)
         eye = mj.MjvCamera()
         eye.lookat[:] = camera.target
         eye.distance, eye.azimuth, eye.elevation = camera.distance, camera.yaw_deg + 90.0, -camera.pitch_deg
         everything = mj.mjtCatBit.mjCAT_ALL.value
-        mj.mjv_updateScene(self._model, data, mj.MjvOption(), None, eye, everything, scene)
+        mj.mjv_updateScene(self._model, self._data, mj.MjvOption(), None, eye, everything, scene)
         if ball is not None and ball[2] > -PAYLOAD_LOOK:  # the ground, which would hide it, is not drawn
             size, color = np.full(3, PAYLOAD_LOOK), np.array(PAYLOAD_COLOR, dtype=np.float32)
             shape = mj.mjtGeom.mjGEOM_SPHERE

@@ -40,7 +40,7 @@ class Blueprint:
                 "gears", spec.gears, "use rotors as armature, or engine 'bullet'", "cannot be coupled here"
             )
         self.spec = spec
-        self.model = model = mj.MjModel.from_xml_string(mjcf(spec))
+        self.model = model = mj.MjModel.from_xml_string(mjcf(spec, visuals=False))
         model.opt.timestep = time_step
         self.bodies = [model.body(link.name).id for link in spec.links]
         self.base = self.bodies[0]
@@ -49,7 +49,7 @@ class Blueprint:
         self.sites = {name: model.site(name).id for name, _, _ in spec.sites}
         # MuJoCo orders coordinates as those of a free base, then the joints' in the order of the tree
         self.base_q, self.base_v = (0, 0) if spec.fixed else (7, 6)
-        self.joints = _span([model.joint(name).dofadr[0] - self.base_v for name in spec.actuated])
+        self.joints = _span([int(model.joint(name).dofadr[0]) - self.base_v for name in spec.actuated])
         self.mass, self.inertia = model.body_mass.copy(), model.body_inertia.copy()
         self.armature = model.dof_armature.copy()
 
@@ -116,7 +116,8 @@ class MujocoWorld(abc.ABC):
 
     def add_force(self, body: int, force: Vector, torque: Vector | NDArray[Any]) -> None:
         """Add a force and a torque (world axes) at a body's center of mass, for the next step only."""
-        self._fields.pushes[body] += (*force, *torque)
+        pushes = self._fields.pushes[body]  # a view
+        pushes += (*force, *torque)
 
     def set_friction(self, coefficient: float) -> None:
         self._fields.pair_friction[:, :2] = coefficient

@@ -32,6 +32,7 @@ from controllers.laws.tracking import (
     is_finite,
     signed_step,
     sliding_variable,
+    times_rows,
 )
 
 
@@ -111,7 +112,7 @@ def artde(
     s_squared = inner(s, s, xp)
     xi = root(inner(e, e, xp) + inner(ed, ed, xp), xp)
     c = state.beta_0 + state.beta_1 * xi
-    robust = (gains.alpha * c / xp.sqrt(s_squared + gains.eps))[..., None] * s
+    robust = times_rows(gains.alpha * c / xp.sqrt(s_squared + gains.eps), s)
     u = desired_acceleration(signals, e, ed, gains.k_p, gains.k_d, xp) + robust
     own = gains.m_bar if m_bar is None else m_bar
     tau, tde_state = time_delay(own, state.tde, signals, u if du is None else u + du, period, xp)

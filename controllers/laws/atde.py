@@ -28,6 +28,7 @@ from controllers.laws.tracking import (
     is_finite,
     signed_step,
     sliding_variable,
+    times_rows,
 )
 
 
@@ -86,7 +87,7 @@ def atde(
     e, ed = errors(signals)
     s = sliding_variable(e, ed, gains.k_p, gains.k_d, xp)
     s_squared = inner(s, s, xp)
-    robust = (gains.alpha * state.c / xp.sqrt(s_squared + gains.eps))[..., None] * s
+    robust = times_rows(gains.alpha * state.c / xp.sqrt(s_squared + gains.eps), s)
     grows = (state.c <= gains.c_floor) | (s_squared > inner(state.s, state.s, xp))
     change = signed_step((period * gains.gamma_0) * root(s_squared, xp), grows)
     u = desired_acceleration(signals, e, ed, gains.k_p, gains.k_d, xp) + robust

@@ -81,7 +81,14 @@ def inner(v: Array, w: Array, xp: Any = np) -> Array:
     if v.shape[-1] == 3:  # faster by components, and the same in any memory order: vecdot rounds by strides
         (a, b, c), (x, y, z) = components(v), components(w)
         return a * x + b * y + c * z
+    if xp is np and v.ndim == w.ndim == 1:
+        return v.dot(w)  # the same bits in half the time
     return xp.vecdot(v, w)
+
+
+def times_rows(factor: Array, v: Array) -> Array:
+    """Multiply each vector of v (..., n) by its factor (...)."""
+    return factor * v if v.ndim == 1 else factor[..., None] * v
 
 
 def components(v: Array) -> tuple[Array, Array, Array]:

@@ -5,7 +5,16 @@ from __future__ import annotations
 import subprocess
 import sys
 
-HEAVY = ("matplotlib", "optuna", "pyarrow.parquet", "ray", "scipy.stats", "stable_baselines3", "torch")
+HEAVY = (
+    "controllers.law_table",
+    "matplotlib",
+    "optuna",
+    "pyarrow.parquet",
+    "ray",
+    "scipy.stats",
+    "stable_baselines3",
+    "torch",
+)
 
 
 def test_workers_and_the_command_line_begin_without_what_only_some_need() -> None:
