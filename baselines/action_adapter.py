@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -16,7 +16,7 @@ class ActionAdapter(Protocol):
 
     features: Layout
     actions: tuple[str, ...]
-    reward_scales: ClassVar[Mapping[str, float]]
+    reward_scales: Mapping[str, float]
 
     def start(self, observation: Array) -> Any:
         """Memory at the start of an episode."""

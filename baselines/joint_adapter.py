@@ -9,7 +9,7 @@ reference, the force that acted, and its action before. The reward is for small 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -41,7 +41,7 @@ class JointAdapter:
         gains: of the base; not used.
     """
 
-    reward_scales: ClassVar[Mapping[str, float]] = {"tracking": 1.0, "effort": -0.1, "residual": -0.01}
+    reward_scales: Mapping[str, float] = {"tracking": 1.0, "effort": -0.1, "residual": -0.01}
 
     def __init__(self, interface: ControlInterface, config: ResidualConfig, gains: Any) -> None:
         del gains

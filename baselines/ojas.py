@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple, get_args
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,7 +94,7 @@ class OjasAdapter:
         gains: of the base, for s; None without one.
     """
 
-    reward_scales: ClassVar[Mapping[str, float]] = {
+    reward_scales: Mapping[str, float] = {
         "alive": 1.0,
         "upright": 0.5,
         "velocity": 0.5,

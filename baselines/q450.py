@@ -2,15 +2,16 @@
 
 Channel "attitude": du_q = TURNING limit x [roll, pitch, yaw] (rad/s^2, body axes) in the attitude loop, which at the
 thesis' gains is the slow one. Channel "position": du_p = limit x [x, y, z] (m/s^2, world axes) in the position loop,
-which alone has little to gain. Channel "cascade": both.
+which alone has little to gain without a cable. Channel "cascade": both.
 
-In an environment with a cable the agent sees it, and is rewarded for the load's errors in place of the vehicle's.
+In an environment with a cable the agent sees it and the load's errors, and is rewarded for these in place of the
+vehicle's. In the channel "position" the attitude's cost nothing there: what moves a load is the vehicle's lean.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -42,6 +43,16 @@ SCALES = {"position": 0.02, "velocity": 0.05, "attitude": 0.01, "turning": 0.1} 
 """Errors that cost a unit of reward. What answers soonest to an action weighs most: most of the position's error is the
 wind's doing, and in that noise an action of 15 ms is not to be found."""
 WORST = 10.0  # units
+REWARD_SCALES = {
+    "alive": 1.0,
+    "position": -0.25,
+    "velocity": -0.25,
+    "attitude": -1.0,
+    "turning": -0.5,
+    "residual": -0.01,
+    "fall": -100.0,
+}
+LOAD_REWARD_SCALES = REWARD_SCALES | {"position": -0.5, "velocity": -0.1, "attitude": 0.0, "turning": 0.0}
 
 
 class Q450AdapterState(NamedTuple):
@@ -60,16 +71,6 @@ class Q450Adapter:
         config: of the residual.
         gains: of the base's position loop, for s; None without one.
     """
-
-    reward_scales: ClassVar[Mapping[str, float]] = {
-        "alive": 1.0,
-        "position": -0.25,
-        "velocity": -0.25,
-        "attitude": -1.0,
-        "turning": -0.5,
-        "residual": -0.01,
-        "fall": -100.0,
-    }
 
     def __init__(self, interface: ControlInterface, config: ResidualConfig, gains: Any) -> None:
         torque = config.base == NO_BASE
@@ -90,6 +91,12 @@ class Q450Adapter:
         self._gains = (loop.k_p, loop.k_d) if hasattr(loop, "k_p") else None
         self._at = interface.observation.slices
         self._slung = "cable" in self._at
+        lean = self._slung and self.actions == AXES
+        self.reward_scales: Mapping[str, float] = LOAD_REWARD_SCALES if lean else REWARD_SCALES
+        load = (
+            Field("load_e", 3, "m", -1.0, 1.0, "of the load, or of the vehicle once it is gone"),
+            Field("load_ed", 3, "m/s", -10.0, 10.0, "of the same"),
+        )
         own = [field for field in interface.observation.fields if field.name in PASSED_ON]
         self.features = Layout(
             (
@@ -103,6 +110,7 @@ class Q450Adapter:
                 Field("force_command", 3, "N", -100.0, 100.0, "of the position loop, a sample ago, world axes"),
                 Field("c", 1, "m/s^2", 0.0, 100.0, "gain of the position loop's robust term"),
                 *own,
+                *(load if self._slung else ()),
                 Field("action", len(self.actions), "1", -1.0, 1.0, "of the agent, a decision ago"),
             )
         )
@@ -130,6 +138,7 @@ class Q450Adapter:
             inside.get("force_command", nothing),
             nothing[..., :1] if c is None else c[..., None],
             *(observation[..., part] for part in self._own),
+            *(self._goal_errors(observation) if self._slung else ()),
             state.action,
         ]
         return np.concatenate(parts, axis=-1, dtype=observation.dtype), state._replace(e_q=e_q, e_w=e_w)

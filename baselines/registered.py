@@ -18,11 +18,12 @@ CONTROLLERS = (
     ),
     _shipped(
         "tde+ppo",
-        "biped, and quadrotor without a cable: TDE + a residual that reinforcement learning (PPO) has trained",
+        "biped, quadrotor: TDE (with a cable TDE + swing) + a residual that reinforcement learning (PPO) has trained",
         {
             "BipedPush-v0": "biped-push",
             "BipedWalk-Payload-v0": "biped-walk",
             "QuadInfinity-Payload-v0": "quadrotor-gale",
+            "QuadSling-Payload-v0": "quadrotor-sling",
         },
     ),
 )

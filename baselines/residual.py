@@ -88,9 +88,16 @@ class Residual:
         """Return the bounded force of one control period and the next state; `more` is added to du."""
         du, adapter = self.adapter.next_residual(state.adapter)
         if more is not None:
-            du = du + more
+            du = _sum(du, more)
         force, base = self.base.predict(observation, state.base, residual=du)
         return force, ResidualState(base, adapter)
+
+
+def _sum(a: Array, b: Array) -> Array:
+    """Add two du; one that is shorter, of the position alone, is zero beyond its end."""
+    short, long = (a, b) if a.shape[-1] <= b.shape[-1] else (b, a)
+    rest = np.zeros((*short.shape[:-1], long.shape[-1] - short.shape[-1]), short.dtype)
+    return np.concatenate([short, rest], axis=-1) + long
 
 
 class PolicyState(NamedTuple):

@@ -43,6 +43,8 @@ LAWS: dict[str, tuple[str, dict[str, Any]]] = {
     "ATDE + swing": ("atde+swing", {}),
     "ARTDE + swing": ("artde+swing", {}),
     "TDE + swing, m_bar 1.6": ("tde+swing", {"preset": "slung"}),
+    "TDE + swing, stiff": ("tde+swing", {"preset": "slung", "k_p_p": 20.0, "k_d_p": 7.0}),
+    "TDE + swing, PPO": ("tde+ppo", {}),
     "TDE + swing, tuned": ("tde+swing", {"preset": "tuned"}),
     "geometric, of the load": ("geometric-load", {}),
     "geometric, of the load, tuned": ("geometric-load", {"preset": "tuned"}),
@@ -68,11 +70,13 @@ def main() -> None:
     (masses, cables), more = FIGURES[options.figure]
     cells = [(mass, cable) for mass in masses for cable in cables]
     found = flights(options.laws, cells, options.seeds, options.seed, more)
-    print("| law | flown | " + " | ".join(title for title, _, _ in COLUMNS.values()) + " | settled | settles s |")
-    print("|---|" + "---|" * (len(COLUMNS) + 3))
-    for number, label in enumerate(options.laws):
-        size = len(cells) * options.seeds
-        print(row(label, found.iloc[number * size : (number + 1) * size]))
+    titles = [title for title, _, _ in COLUMNS.values()]
+    print("| law | flown | " + " | ".join([*titles, "settled", "settles s", "load below the first law's, %"]) + " |")
+    print("|---|" + "---|" * (len(titles) + 4))
+    size = len(cells) * options.seeds
+    parts = [found.iloc[at : at + size].reset_index(drop=True) for at in range(0, len(found), size)]
+    for label, part in zip(options.laws, parts, strict=True):
+        print(row(label, part, parts[0]))
 
 
 def flights(
@@ -108,8 +112,11 @@ def scenario(mass: float, cable: float) -> dict[str, Any]:
     return {**given, "payload": payload, "push": [kick(mass)]}
 
 
-def row(label: str, found: pd.DataFrame) -> str:
-    """Return a law's row: means of the flights that end, with intervals; the median settling time, never included."""
+def row(label: str, found: pd.DataFrame, first: pd.DataFrame) -> str:
+    """Return a law's row: means of the flights that end, with intervals; the median settling time, never included.
+
+    The last cell compares load errors with the first law's, flight by flight, where both end.
+    """
     whole = found[~found["fell"]]
     cells = [label, f"{len(whole)}/{len(found)}"]
     for column, (_, scale, digits) in COLUMNS.items():
@@ -119,6 +126,9 @@ def row(label: str, found: pd.DataFrame) -> str:
     middle = statistics.median(settled)
     cells.append(f"{int(np.isfinite(settled).sum())}/{len(whole)}")
     cells.append(f"{middle.value:.1f} ({middle.low:.1f}..{middle.high:.1f})" if len(whole) else "")
+    both = ~(found["fell"] | first["fell"]).astype(bool)
+    gain = statistics.improvement(found.loc[both, "rms_load_error_m"], first.loc[both, "rms_load_error_m"])
+    cells.append(f"{gain.value:.1f} ({gain.low:.1f}..{gain.high:.1f})" if found is not first else "")
     return "| " + " | ".join(cells).replace("inf", "never") + " |"
 
 

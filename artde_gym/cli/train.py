@@ -30,6 +30,9 @@ def train(
     base: Annotated[
         str, typer.Option(help="Controller below the residual; none: the agent commands the force.")
     ] = "tde",
+    gains: Annotated[
+        str | None, typer.Option(help="JSON; gains of the base, or its preset, in place of the default's.")
+    ] = None,
     algo: Annotated[str, typer.Option(help="ppo, sac, or cma-es for the biped's linear balance law.")] = "ppo",
     steps: Annotated[int, typer.Option(help="Decisions of the agent, summed over environments.")] = 1_000_000,
     seed: Seed = 0,
@@ -39,6 +42,9 @@ def train(
     ] = "",
     action_scale: Annotated[
         float, typer.Option(help="Largest residual. Default: the action mode's.", show_default=False)
+    ] = 0.0,
+    decision_period: Annotated[
+        float, typer.Option(help="Time between two decisions, in s. Default: the robot's.", show_default=False)
     ] = 0.0,
     channel: Annotated[str | None, typer.Option(hidden=True)] = None,
     limit: Annotated[float | None, typer.Option(hidden=True)] = None,
@@ -63,9 +69,18 @@ def train(
         renamed_option("--limit", "--action-scale")
         action_scale = limit
     kwargs = environment_kwargs(env_kwargs, engine)
+    config = ResidualConfig(
+        task(env).robot,
+        base,
+        json_object("--gains", gains) or {},
+        action_mode=action_mode,
+        decision_period=decision_period,
+        action_scale=action_scale,
+        gated=gated,
+    )
     training = Training(
         env,
-        ResidualConfig(task(env).robot, base, action_mode=action_mode, action_scale=action_scale, gated=gated),
+        config,
         algo=algo,
         steps=steps,
         seed=seed,

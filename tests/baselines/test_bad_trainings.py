@@ -124,6 +124,9 @@ def test_a_disk_that_is_full_leaves_no_empty_record(tmp_path: Path, monkeypatch:
         ["--env-kwargs", '{"nope": 1}'],
         ["--seed", "-1"],
         ["--action-scale", "nan"],
+        ["--gains", "[1]"],
+        ["--gains", '{"k_p": -1}'],
+        ["--decision-period", "0.02"],
     ],
 )
 def test_a_mistake_is_one_line(arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -12,10 +12,12 @@ import pytest
 
 import artde_gym  # noqa: F401  (registers the environments)
 import baselines
+import controllers
 from artde_gym.errors import OptionError
 from artde_gym.robots.q450.sling import OBSERVATION
 from baselines.network import Network
 from baselines.policy_file import DESCRIPTION, save
+from baselines.q450 import SCALES, WORST
 from baselines.residual import Residual
 from baselines.residual_config import ResidualConfig
 from baselines.run import Run, Training
@@ -37,7 +39,7 @@ def test_the_agent_sees_the_cable_only_where_there_is_one(env: Any) -> None:
     slung = residual(env).features.slices
     other = gym.make_vec("QuadInfinity-Payload-v0", 1, "vector_entry_point", engine="numpy")
     without = Residual.of(other, ResidualConfig("q450")).features.slices
-    assert slung.keys() - without.keys() == {"cable", "cable_rate", "cable_held"}
+    assert slung.keys() - without.keys() == {"cable", "cable_rate", "cable_held", "load_e", "load_ed"}
 
 
 def test_the_reward_is_for_the_load_while_one_hangs_and_for_the_vehicle_afterwards(env: Any) -> None:
@@ -62,6 +64,39 @@ def test_the_reward_is_for_the_load_while_one_hangs_and_for_the_vehicle_afterwar
     moving = {"velocity": observation[OBSERVATION["velocity_ref"]] + [0.0, 0.1, 0.0], "cable": [0.0, 0.0, -0.5]}
     assert costs(**moving, cable_rate=[0.0, -0.1, 0.0])[1] == pytest.approx(0.0, abs=1e-6)
     assert costs(**moving, cable_rate=0.0)[1] == pytest.approx(2.0)
+
+
+def test_an_agent_that_moves_the_vehicle_sees_the_errors_it_pays_for_and_leans_at_no_cost(env: Any) -> None:
+    own = Residual.of(env, ResidualConfig("q450", "tde+swing", action_mode="position"))
+    observation = env.reset(seed=0)[0]
+    for _ in range(60):
+        observation, *_ = env.step(np.tile([20.0, 0.02, -0.01, 0.0], (2, 1)))  # tips over: errors of all kinds
+    features, state = own.observe(observation, own.start(observation))
+    terms = own.adapter.reward_terms(observation, state.adapter, np.zeros(2, np.bool_))
+    for name, field in (("position", "load_e"), ("velocity", "load_ed")):
+        seen = np.linalg.norm(features[:, own.features.slices[field]], axis=-1)
+        assert terms[name] == pytest.approx(np.minimum(seen / SCALES[name], WORST))
+    assert (terms["attitude"] > 1.0).all()
+    scales = own.adapter.reward_scales
+    assert (scales["attitude"], scales["turning"]) == (0.0, 0.0)
+    assert residual(env).adapter.reward_scales["attitude"] < 0.0
+
+
+def test_a_residual_of_the_attitude_adds_to_one_of_the_position(env: Any) -> None:
+    """The trained policy is a base; what is added to it counts as if both had been one du of both loops."""
+    rng = np.random.default_rng(2)
+    trained = controllers.make("tde+ppo", env)
+    observation, _ = env.reset(seed=0)
+    move, turn = rng.normal(size=(2, 3)), rng.normal(size=(2, 6))
+    state = trained.start(trained.read(observation))
+    features, _ = trained.residual.observe(observation, state.residual)
+    own = 2.0 * np.clip(trained.actor(features), -1.0, 1.0)
+    for more in (move, turn):
+        du = np.concatenate([more, np.zeros((2, 6 - more.shape[-1]))], axis=-1)
+        du[:, :3] += own
+        found, _ = trained.predict(observation, residual=more)
+        expected, _ = trained.residual.base.predict(observation, residual=du)
+        np.testing.assert_allclose(found, expected, rtol=1e-6)
 
 
 @pytest.mark.parametrize("level", [0.0, 1.0])
