@@ -122,7 +122,7 @@ class ArmTrackVectorEnv(JointVectorEnv[task.Tracking]):
         out[:, columns["q"]], out[:, columns["qd"]] = state.q, state.qd
         out[:, columns["q_ref"].start : columns["qdd_ref"].stop] = self._task.plan[self._k]
         out[:, columns["tau_applied"]] = self._tau
-        out[:, columns["tool"]] = [world.site(TOOL) for world in self._batch.worlds]
+        out[:, columns["tool"]] = self._batch.site(TOOL)
         out[:, columns["tool_ref"]] = self._task.tool[self._k]
         return out
 
