@@ -40,9 +40,9 @@ def joint_loop(engine: Engine) -> Callable[[Array], Any]:
 
 
 def joint_loops(engine: Engine, n: int) -> Callable[[Array], Any]:
-    """Return a function of joint torques (n, joints) that writes them, steps and reads the joints of `n` robots in turn.
+    """Return a function of joint torques (n, joints) that writes them, steps and reads the joints, robot by robot.
 
-    They are in MuJoCo, share the engine's model, and begin as its robot is now, each in memory of its own.
+    The `n` robots are in MuJoCo, share the engine's model, and begin as its robot is now, each in memory of its own.
     """
     mj, model, data, joints = _mujoco(engine)
     first = 0 if engine.spec.fixed else 6
