@@ -66,7 +66,7 @@ def main() -> None:
     parser.add_argument("files", nargs="*", type=Path, help="URDF or MJCF; default: the public ones that are installed")
     parser.add_argument("--armature", default="0.1", help="kg m^2 of each joint, or 'file' for the file's own")
     parser.add_argument("--law", default="tde")
-    parser.add_argument("--episodes", type=int, default=5, help="of each scenario")
+    parser.add_argument("--episodes", type=int, default=1, help="of each scenario")
     parser.add_argument("--seed", type=int, default=31)
     options = parser.parse_args()
     arms = {file.stem: (file, None) for file in options.files} or installed()
@@ -88,9 +88,7 @@ def row(kwargs: dict[str, Any], law: str, episodes: int, seed: int) -> str:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of rotor inertia that is missing: the option says so
-            found = evaluate(
-                [law], scenario=list(SCENARIOS), episodes=episodes, seed=seed, env_kwargs=kwargs, vectorized=True
-            )
+            found = evaluate([law], scenario=SCENARIOS, episodes=episodes, seed=seed, env_kwargs=kwargs)
     except ArtdeGymError as error:
         return f"*{error}*" + " |" * (len(SCENARIOS) - 1)
     return " | ".join(cell(found.episodes[found.episodes["scenario"] == name]) for name in SCENARIOS)

@@ -21,7 +21,7 @@ from artde_gym.studies.multiverse.factor import Factor
 from artde_gym.studies.multiverse.result import FATES, Multiverse
 from artde_gym.studies.multiverse.verdict import Verdict
 
-WIDE, SIDE = 460, 64  # units of a chart, and of its margins
+WIDE, SIDE = 500, 64  # units of a chart, and of its margins
 ROW = 38  # units, of a bar with its words
 BINS = 6  # of the survival curve
 COLUMNS = 24  # of a histogram

@@ -11,8 +11,9 @@ from typing import Any
 import gymnasium as gym
 import mujoco
 import numpy as np
+import pandas as pd
 import pytest
-from arms import PUBLIC, installed
+from arms import PUBLIC, PYBULLET, SCENARIOS, cell, installed, row
 
 import controllers
 from artde_gym.multibody.dynamics import RigidBodyTree
@@ -38,6 +39,25 @@ def public_arm(request: pytest.FixtureRequest) -> tuple[Path, str | None]:
     if request.param not in installed():
         pytest.skip("needs example-robot-data")
     return installed()[request.param]
+
+
+@pytest.mark.bullet
+def test_the_table_of_public_arms_has_those_of_pybullet() -> None:
+    assert set(PYBULLET) <= set(installed())
+
+
+def test_an_arm_that_cannot_be_simulated_has_its_error_for_a_row(tmp_path: Path) -> None:
+    file = tmp_path / "empty.urdf"
+    file.write_text("<robot name='empty'/>")
+    cells = row({"robot": str(file), "engine": "mujoco"}, "tde", 1, 0)
+    assert "empty.urdf" in cells
+    assert cells.count("|") == len(SCENARIOS) - 1
+
+
+def test_a_cell_has_the_mean_error_and_the_early_ends() -> None:
+    rows = {"rmse_mm": [1.0, 3.0, 2.0], "fell": [False, True, True], "fall_reason": ["", "speed", "speed"]}
+    assert cell(pd.DataFrame(rows)) == "2 (2 speed)"
+    assert cell(pd.DataFrame(rows).iloc[:1]) == "1"
 
 
 class Judge:
