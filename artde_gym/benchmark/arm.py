@@ -43,7 +43,7 @@ class EmptyStep(BareArm):
 class PlainArm(BareArm):
     """A step with the environment's physics, observation, reward and end, written down without anything else.
 
-    It checks nothing, knows neither disturbances nor `info`: the least that this task takes in Python.
+    It checks nothing, and knows neither disturbances nor `info`: about the least that this task takes in Python.
     """
 
     def __init__(self, loop: ClosedLoop, engine: str) -> None:
@@ -84,8 +84,8 @@ def tracking(quick: bool) -> Section:
         f"{STEPS} steps of pick and place with the built-in arm at a control period of 1 ms (a physics step each), on "
         "one core. The environment alone and the bare engine repeat the torques of ARTDE's closed loop. Beyond the "
         "engine's step the environment computes friction of seven joints, the tool's position, reward and `info`. The "
-        "plain step has the same physics, observation, reward and end, but no checks, disturbances and `info`: one arm "
-        "cannot come nearer to the engine in Python. Many arms are one vector environment in MuJoCo, against a bare "
+        "plain step has the same physics, observation, reward and end, but no checks, disturbances and `info`: about "
+        "the least for one arm in Python. Many arms are one vector environment in MuJoCo, against a bare "
         f"loop over as many in Python, each in memory of its own; {MANY} steps of all arms together."
     )
     return Section("The arm", text, (*_single(quick), *_many(quick)), skipped)
