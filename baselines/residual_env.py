@@ -33,8 +33,8 @@ class ResidualEnv(gym.Wrapper[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[
         config: of the residual.
 
     ## Action
-    `Box(-1, 1, (n,), float32)`; its components are `actions` (names), what they do is told by `baselines.ojas` and
-    `baselines.q450`. Clipped to the bounds.
+    `Box(-1, 1, (n,), float32)`; its components are `actions` (names), what they do is told by `baselines.arm`,
+    `baselines.ojas` and `baselines.q450`. Clipped to the bounds.
 
     ## Observation
     `Box(-inf, inf, (n,), float32)`; `observation_layout` names its fields. Not normalized: that is for training.

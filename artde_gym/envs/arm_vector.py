@@ -114,15 +114,16 @@ class ArmTrackVectorEnv(JointVectorEnv[task.Tracking]):
     def _acting(self, torques: Array, some: Mask, step: int) -> Array:
         torques = super()._acting(torques, some, step)
         with np.errstate(invalid="ignore", over="ignore"):  # of an arm that has diverged
-            return torques + self._task.friction(self._friction, self._batch.state().qd)
+            _, qd = self._batch.joints()
+            return torques + self._task.friction(self._friction, qd)
 
     def _truth(self) -> Array:
-        state, columns = self._batch.state(), self._columns
+        columns = self._columns
         out = np.empty((self.num_envs, self.observation_layout.size))
-        out[:, columns["q"]], out[:, columns["qd"]] = state.q, state.qd
+        out[:, columns["q"]], out[:, columns["qd"]] = self._batch.joints()
         out[:, columns["q_ref"].start : columns["qdd_ref"].stop] = self._task.plan[self._k]
         out[:, columns["tau_applied"]] = self._tau
-        out[:, columns["tool"]] = [world.site(TOOL) for world in self._batch.worlds]
+        out[:, columns["tool"]] = self._batch.site(TOOL)
         out[:, columns["tool_ref"]] = self._task.tool[self._k]
         return out
 

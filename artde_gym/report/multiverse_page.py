@@ -21,7 +21,7 @@ from artde_gym.studies.multiverse.factor import Factor
 from artde_gym.studies.multiverse.result import FATES, Multiverse
 from artde_gym.studies.multiverse.verdict import Verdict
 
-WIDE, SIDE = 460, 64  # units of a chart, and of its margins
+WIDE, SIDE = 500, 64  # units of a chart, and of its margins
 ROW = 38  # units, of a bar with its words
 BINS = 6  # of the survival curve
 COLUMNS = 24  # of a histogram
@@ -72,10 +72,9 @@ def _blank(name: str, x: Axis, rows: int, foot: str = "") -> Chart:
     return chart
 
 
-def _verdict_bars(verdicts: Sequence[Verdict]) -> str:
+def claims_chart(verdicts: Sequence[Verdict]) -> Chart:
+    """Draw in how many worlds each claim holds, ties and reverses: claims of which some world tells."""
     shown = [verdict for verdict in verdicts if verdict.decided]
-    if not shown:
-        return paragraph("No world tells anything of a claim yet.", "soft")
     chart = _blank("Share of worlds in which each claim holds, ties and reverses", Axis("", 0.0, 100.0), len(shown),
                    "% of the worlds of which the claim says something")  # fmt: skip
     for row, verdict in enumerate(shown):
@@ -84,11 +83,17 @@ def _verdict_bars(verdicts: Sequence[Verdict]) -> str:
         _stacked(chart, [verdict.count(outcome) for outcome in OUTCOMES], list(SHOWN.values()), y, 0.0, 100.0)
         low, high = verdict.share("holds")[1:3]
         chart.line([100 * low, 100 * high], [y + 0.3] * 2, Style("#000000", "o"), text="95 % interval of holds")
+    return chart
+
+
+def _verdict_bars(verdicts: Sequence[Verdict]) -> str:
+    if not any(verdict.decided for verdict in verdicts):
+        return paragraph("No world tells anything of a claim yet.", "soft")
     caption = (
         "In how many worlds each claim holds, ties and reverses; in brackets, of how many it tells. The line is the "
         "95 % interval (Wilson) of the share in which it holds."
     )
-    return figure(caption, {"": chart.svg()}, SHOWN)
+    return figure(caption, {"": claims_chart(verdicts).svg()}, SHOWN)
 
 
 def _stacked(chart: Chart, counts: Sequence[int], shown: Sequence[Style], y: float, left: float, right: float) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 from typing import Any
 
@@ -34,6 +35,27 @@ def joint_loop(engine: Engine) -> Callable[[Array], Any]:
         torques[joints] = tau
         mj.mj_step(model, data)
         return data.qpos.copy(), data.qvel.copy()
+
+    return in_mujoco
+
+
+def joint_loops(engine: Engine, n: int) -> Callable[[Array], Any]:
+    """Return a function of joint torques (n, joints) that writes them, steps and reads the joints, robot by robot.
+
+    The `n` robots are in MuJoCo, share the engine's model, and begin as its robot is now, each in memory of its own.
+    """
+    mj, model, data, joints = _mujoco(engine)
+    first = 0 if engine.spec.fixed else 6
+    robots = [copy.copy(data) for _ in range(n)]
+    torques = [robot.qfrc_applied[first:] for robot in robots]
+
+    def in_mujoco(tau: Array) -> Any:
+        read = []
+        for robot, written, given in zip(robots, torques, tau, strict=True):
+            written[joints] = given
+            mj.mj_step(model, robot)
+            read.append((robot.qpos.copy(), robot.qvel.copy()))
+        return read
 
     return in_mujoco
 

@@ -5,6 +5,7 @@ Each world behaves bitwise like `MujocoEngine`, for any number of worlds and thr
 
 from __future__ import annotations
 
+import functools
 from typing import Any, NamedTuple, TypeAlias
 
 import mujoco
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from artde_gym.arrays import Array
 from artde_gym.errors import RobotError
 from artde_gym.multibody.spec import RobotSpec, Vector
+from artde_gym.sim.mujoco_kinematics import Kinematics
 from artde_gym.sim.mujoco_world import FIELDS, Blueprint, Fields, MujocoWorld
 from artde_gym.sim.rotation import rotate
 
@@ -169,6 +171,14 @@ class MujocoBatch:
         self._place.qpos[:] = self._pose[world]
         mj.mj_kinematics(self._blueprint.model, self._place)
         return self._place
+
+    def site(self, name: str) -> Array:
+        """Return the positions of a site in all worlds (n, 3) (m, world axes)."""
+        return self._kinematics.site(self._blueprint.site(name), self._pose)
+
+    @functools.cached_property
+    def _kinematics(self) -> Kinematics:
+        return Kinematics(self._blueprint.spec)
 
     def masses_changed(self, world: int) -> None:
         """See `MujocoWorld.masses_changed`."""

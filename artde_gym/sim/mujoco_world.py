@@ -53,6 +53,16 @@ class Blueprint:
         self.mass, self.inertia = model.body_mass.copy(), model.body_inertia.copy()
         self.armature = model.dof_armature.copy()
 
+    def site(self, name: str) -> int:
+        """Return the index of a site.
+
+        Raises:
+            RobotError: if there is none of this name.
+        """
+        if name not in self.sites:
+            raise RobotError("site", name, ", ".join(map(repr, self.sites)))
+        return self.sites[name]
+
 
 class Fields(NamedTuple):
     """`FIELDS` of one world, and `pushes`, its applied forces and torques at the centers of mass (bodies, 6)."""
@@ -88,7 +98,7 @@ class MujocoWorld(abc.ABC):
     def foot_loads(self) -> tuple[float, ...]: ...
 
     def apply_force(self, site: str, force: Vector) -> None:
-        number, data = self._site(site), self.placed()
+        number, data = self._blueprint.site(site), self.placed()
         body = self._blueprint.model.site_bodyid[number]
         arm = data.site_xpos[number] - data.xipos[body]
         self.add_force(body, force, np.cross(arm, force))
@@ -104,15 +114,9 @@ class MujocoWorld(abc.ABC):
 
     def site(self, name: str) -> Vector:
         """See `artde_gym.sim.engine.Engine`."""
-        number = self._site(name)
+        number = self._blueprint.site(name)
         x, y, z = self.placed().site_xpos[number].tolist()
         return x, y, z
-
-    def _site(self, name: str) -> int:
-        sites = self._blueprint.sites
-        if name not in sites:
-            raise RobotError("site", name, ", ".join(map(repr, sites)))
-        return sites[name]
 
     def add_force(self, body: int, force: Vector, torque: Vector | NDArray[Any]) -> None:
         """Add a force and a torque (world axes) at a body's center of mass, for the next step only."""

@@ -192,9 +192,7 @@ Q450: dict[tuple[str, str], Preset] = {
     ),
     ("asmc", "tuned"): Preset(
         _cascade(
-            _sliding(
-                _MASS, 4.529, 0.3403, c_floor=2.209, gamma_c=0.07313, eps=0.04876, gamma_r=4.472, gravity=GRAVITY
-            ),
+            _sliding(_MASS, 4.529, 0.3403, c_floor=2.209, gamma_c=0.07313, eps=0.04876, gamma_r=4.472, gravity=GRAVITY),
             _sliding(_INERTIA, 12.26, 13.24, c_floor=1.519, gamma_c=0.2084, eps=0.02538, gamma_r=0.0, gravity=0.0),
         ),
         _TUNED,

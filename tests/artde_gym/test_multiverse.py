@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from typing import Any
+from xml.etree import ElementTree
 
 import gymnasium as gym
 import numpy as np
@@ -138,7 +139,7 @@ def test_what_an_environment_refuses_shows_before_the_first_episode(tmp_path):
 
 
 def test_an_unknown_design_names_the_standard_ones():
-    with pytest.raises(OptionError, match=r"ojas, q450.*did you mean 'ojas'"):
+    with pytest.raises(OptionError, match=r"arm, ojas, q450.*did you mean 'ojas'"):
         load("ojass")
 
 
@@ -369,11 +370,13 @@ def test_without_scikit_learn_everything_else_works(monkeypatch, biped, tmp_path
         what_decides(np.zeros((20, 1)), ["holds"] * 20)
     file = tmp_path / "design.yaml"
     file.write_text(json.dumps(BIPED))
-    outcome = CliRunner().invoke(
-        app, ["multiverse", "--design", str(file), "--out", str(biped.folder), "--workers", "1", "--report"]
-    )
+    words = ["--out", str(biped.folder), "--workers", "1", "--report", "--figure", str(tmp_path / "claims.svg")]
+    outcome = CliRunner().invoke(app, ["multiverse", "--design", str(file), *words])
     assert outcome.exit_code == 0, f"{outcome.output} {outcome.exception!r}"
     assert "scikit-learn" in outcome.output
+    drawing = ElementTree.parse(tmp_path / "claims.svg").getroot()
+    written = {element.text for element in drawing.iter() if element.tag.endswith("text")}
+    assert {f"{verdict.claim.text} ({verdict.decided})" for verdict in biped.verdicts if verdict.decided} <= written
     assert (biped.folder / "report.html").stat().st_size > 10_000
 
 
@@ -394,7 +397,8 @@ def test_a_report_shows_every_claim_and_a_command(biped):
 
 
 @pytest.mark.parametrize(
-    ("env_id", "suffixes"), [("BipedWalk-Payload-v0", ("",)), ("QuadInfinity-Payload-v0", ("_p", "_q"))]
+    ("env_id", "suffixes"),
+    [("ArmTrack-Payload-v0", ("",)), ("BipedWalk-Payload-v0", ("",)), ("QuadInfinity-Payload-v0", ("_p", "_q"))],
 )
 def test_policies_side_by_side_do_what_each_does_alone(env_id, suffixes):
     env: Any = gym.make_vec(env_id, 6, vectorization_mode="vector_entry_point", engine=ENGINE[env_id])
@@ -427,7 +431,7 @@ def test_policies_side_by_side_do_what_each_does_alone(env_id, suffixes):
     env.close()
 
 
-ENGINE = {"BipedWalk-Payload-v0": "mujoco", "QuadInfinity-Payload-v0": "numpy"}
+ENGINE = {"ArmTrack-Payload-v0": "mujoco", "BipedWalk-Payload-v0": "mujoco", "QuadInfinity-Payload-v0": "numpy"}
 
 
 def test_each_environment_of_a_vector_may_have_disturbances_of_its_own():

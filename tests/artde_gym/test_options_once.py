@@ -60,8 +60,11 @@ def test_design_refuses_an_option_that_would_do_nothing_or_cannot_be_met(words: 
 
 
 @pytest.mark.parametrize("figure", ["x.png", "/nonexistent/x.svg"])
-def test_a_frontier_refuses_its_figure_before_it_runs(figure: str) -> None:
-    assert figure in refusal("frontier", "--controllers", "tde", "--vary", "payload.mass", "--figure", figure)
+@pytest.mark.parametrize(
+    "study", [["frontier", "--controllers", "tde", "--vary", "payload.mass"], ["multiverse", "--design", "ojas"]]
+)
+def test_a_study_refuses_its_figure_before_it_runs(study: list[str], figure: str) -> None:
+    assert figure in refusal(*study, "--figure", figure)
 
 
 @pytest.mark.parametrize("command", ["evaluate", "frontier", "tune", "video", "replay", "play"])

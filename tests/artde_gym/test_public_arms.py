@@ -3,7 +3,6 @@
 Nothing of them is copied: these tests run where `example-robot-data` is installed.
 """
 
-import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,7 +11,9 @@ from typing import Any
 import gymnasium as gym
 import mujoco
 import numpy as np
+import pandas as pd
 import pytest
+from arms import PUBLIC, PYBULLET, SCENARIOS, cell, installed, row
 
 import controllers
 from artde_gym.multibody.dynamics import RigidBodyTree
@@ -30,27 +31,33 @@ pin: Any = pinocchio
 mj: Any = mujoco
 ID = "ArmTrack-Payload-v0"
 TIGHT: Any = {"rtol": 0, "atol": 1e-9}
-ROOTS = [Path(root) / "cmeel.prefix" / "share" / "example-robot-data" / "robots" for root in sys.path]
-ARMS = {
-    "ur5": ("ur_description/urdf/ur5_robot.urdf", None),
-    "ur10": ("ur_description/urdf/ur10_robot.urdf", None),
-    "jaco": ("kinova_description/robots/kinova.urdf", None),
-    "xarm7": ("xarm_description/urdf/xarm7.urdf", None),
-    "panda": ("panda_description/urdf/panda.urdf", None),
-    "talos": ("talos_data/robots/talos_left_arm.urdf", None),  # with a sensor that is a point mass
-    "whole talos": ("talos_data/robots/talos_full_v2.urdf", "arm_left_7_link"),
-    "tiago": ("tiago_description/robots/tiago_no_hand.urdf", "arm_7_link"),
-}
 
 
-@pytest.fixture(params=ARMS)
+@pytest.fixture(params=PUBLIC)
 def public_arm(request: pytest.FixtureRequest) -> tuple[Path, str | None]:
     """Return file and tip of an arm."""
-    name, tip = ARMS[request.param]
-    found = next((root / name for root in ROOTS if (root / name).is_file()), None)
-    if found is None:
+    if request.param not in installed():
         pytest.skip("needs example-robot-data")
-    return found, tip
+    return installed()[request.param]
+
+
+@pytest.mark.bullet
+def test_the_table_of_public_arms_has_those_of_pybullet() -> None:
+    assert set(PYBULLET) <= set(installed())
+
+
+def test_an_arm_that_cannot_be_simulated_has_its_error_for_a_row(tmp_path: Path) -> None:
+    file = tmp_path / "empty.urdf"
+    file.write_text("<robot name='empty'/>")
+    cells = row({"robot": str(file), "engine": "mujoco"}, "tde", 1, 0)
+    assert "empty.urdf" in cells
+    assert cells.count("|") == len(SCENARIOS) - 1
+
+
+def test_a_cell_has_the_mean_error_and_the_early_ends() -> None:
+    rows = {"rmse_mm": [1.0, 3.0, 2.0], "fell": [False, True, True], "fall_reason": ["", "speed", "speed"]}
+    assert cell(pd.DataFrame(rows)) == "2 (2 speed)"
+    assert cell(pd.DataFrame(rows).iloc[:1]) == "1"
 
 
 class Judge:

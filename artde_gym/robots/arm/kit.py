@@ -7,6 +7,7 @@ A3 is three times the rated weight and 10 N for .2 s.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from artde_gym.kit import Environment, FrontierTest, Motion, Push, Range, RobotKit, random_push
@@ -84,4 +85,5 @@ KIT = RobotKit(
     motion=Motion("pick and place", 0.0, 12.0),
     push=Push("tool", 30.0),
     scene="artde_gym.robots.arm.scene:scene",
+    multiverse=Path(__file__).parent / "assets/multiverse.yaml",
 )
