@@ -8,7 +8,7 @@ falls with the root of its error.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +32,7 @@ class ArmAdapter(JointAdapter):
         gains: of the base; not used.
     """
 
-    reward_scales: ClassVar[Mapping[str, float]] = {"tool": 1.0, "residual": -0.01, "fall": -50.0}
+    reward_scales: Mapping[str, float] = {"tool": 1.0, "residual": -0.01, "fall": -50.0}
 
     def __init__(self, interface: ControlInterface, config: ResidualConfig, gains: Any) -> None:
         super().__init__(interface, config, gains)

@@ -63,7 +63,8 @@ def again(game: Game, names: Any) -> Game:
 @pytest.mark.parametrize("given", [{}, {"preset": "tuned"}, {"k_p_p": 7}, {"preset": "tuned", "m_bar_p": 1.5}], ids=str)
 def test_sliders_show_the_gains_that_act(given):
     player = flying(["tde"], gains={"tde": given}).players[0]
-    acting = {f"{name}_p": getattr(player.policy.gains.position, name) for name in ("m_bar", "k_p", "k_d")}
+    law: Any = player.policy
+    acting = {f"{name}_p": getattr(law.gains.position, name) for name in ("m_bar", "k_p", "k_d")}
     assert {gain: player.sliders()[gain][-1] for gain in acting} == acting
 
 
