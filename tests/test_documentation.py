@@ -110,9 +110,10 @@ def test_there_is_enough_to_run():
 
 
 def needing(name: str) -> Any:
-    """A script by name, marked if it needs PyTorch."""
+    """A script by name, marked if it needs PyTorch; of the tutorials only the first run, too, runs on each Python."""
     torch = any(package in SCRIPTS[name] for package in ("stable_baselines3", "import torch"))
-    return pytest.param(name, marks=[pytest.mark.torch] if torch else [])
+    further = name.startswith("tutorials") and "first-run" not in name
+    return pytest.param(name, marks=[pytest.mark.torch] * torch + [pytest.mark.once] * further)
 
 
 @pytest.mark.parametrize("name", [needing(name) for name in SCRIPTS])
