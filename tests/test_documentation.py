@@ -253,7 +253,7 @@ def test_page_of_an_environment_has_its_whole_layout(env_id):
 
 
 def test_an_option_that_is_none_is_found():
-    with pytest.raises(typer.TyperException, match="--episods"):
+    with pytest.raises(Exception, match=r"No such option\W+--episods"):  # its class differs between releases of Typer
         parse(["evaluate", "--episods", "3"])
 
 
