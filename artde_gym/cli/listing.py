@@ -32,7 +32,7 @@ def list_everything(
 ) -> None:
     """List environments, scenarios, controllers, disturbances.
 
-    A topic shows them in full: the ranges of gains, the schemas of disturbances, the standard frontiers.
+    Name a topic to see all of its entries with their values: gains, schemas of disturbances, standard frontiers.
     """
     if topic is not None and topic not in TOPICS:
         raise UnknownNameError("topic", topic, suggest_names(topic, TOPICS))

@@ -127,7 +127,7 @@ def test_the_tool_draws_a_figure_eight(tmp_path):
 
 
 def test_a_figure_eight_goes_through_a_home_of_zeros(tmp_path):
-    """Its middle is reached to rounding, and the search goes on from there."""
+    """The search for a pose passes the home, where joints are zero but for rounding, and must not stop there."""
     crane, time = read_arm(small_arm(tmp_path)), 0.01 * np.arange(601)
     assert not home(crane).any()
     place = Tool(crane).position(reference(crane, {"size": [0.15, 0.08], "period": 4.0}, time).q)
