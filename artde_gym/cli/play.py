@@ -116,7 +116,7 @@ def _announce(server: Server, browser: bool) -> None:
         console.print("Opened in a browser. Ctrl-C ends it.")
         return
     if server.loopback:
-        forward = f"ssh -L {server.port}:{server.host}:{server.port} {socket.gethostname()}"
+        forward = f"ssh -L {server.forwarded} {socket.gethostname()}"
         console.print(f"From another machine: {forward}\nthen open the address there.", soft_wrap=True, highlight=False)
     console.print("Ctrl-C ends it.")
 

@@ -102,10 +102,12 @@ class Server:
 
     def _listening(self, port: int | None) -> Any:
         try:
+            family = socket.AF_INET6 if ":" in self.host else socket.AF_INET
+            place = (self.host, PORT if port is None else port)
+            socket.getaddrinfo(self.host or None, 0, family)  # `create_server` leaves a socket open where this fails
             return serve(
                 self._watch,
-                self.host,
-                PORT if port is None else port,
+                sock=socket.create_server(place, family=family),
                 process_request=self._admit,
                 compression=None,
                 max_size=LARGEST_MESSAGE,
@@ -114,12 +116,13 @@ class Server:
                 server_header=None,
                 logger=_quiet,
             )
-        except OSError as error:
+        except (OSError, ValueError) as error:  # ValueError: a name that cannot be encoded
             if port is None:
                 return self._listening(0)
-            place = f"{self.host}:{port}"
             raise OptionError(
-                "host and port", place, f"an address of this machine and a free port ({error})"
+                "host and port",
+                f"{_bracketed(self.host)}:{port}",
+                f"an address of this machine and a free port ({error})",
             ) from error
 
     @property
@@ -135,8 +138,13 @@ class Server:
     @property
     def address(self) -> str:
         """The address of the page, with its token."""
-        host = socket.gethostname() if self.host in ("0.0.0.0", "") else self.host
+        host = socket.gethostname() if self.host in ("0.0.0.0", "::", "") else _bracketed(self.host)
         return f"http://{host}:{self.port}/?token={self.token}"
+
+    @property
+    def forwarded(self) -> str:
+        """The argument of `ssh -L` that makes the same port of another machine lead here."""
+        return f"{self.port}:{_bracketed(self.host)}:{self.port}"
 
     def tell(self, news: News) -> None:
         """Give all browsers the latest news; none of them is waited for."""
@@ -259,6 +267,11 @@ def _refuse(constant: str) -> None:
 
 def _answer(connection: ServerConnection, status: HTTPStatus, text: str) -> Response:
     return connection.respond(status, f"{text}\n")
+
+
+def _bracketed(host: str) -> str:
+    """Return a host as it stands before a port: an IPv6 address in brackets."""
+    return f"[{host}]" if ":" in host else host
 
 
 def _is_address(name: str) -> bool:

@@ -8,6 +8,7 @@ import json
 import signal
 import socket
 import threading
+import urllib.request
 from collections.abc import Iterator
 from typing import Any
 
@@ -158,6 +159,29 @@ def test_only_this_machine_can_connect(server):
     assert server._server.socket.getsockname()[0] == "127.0.0.1"
     assert server.address == f"http://127.0.0.1:{server.port}/?token={server.token}"
     assert len(server.token) >= 32
+
+
+def test_an_ipv6_address_is_one_to_listen_at():
+    try:
+        opened = Server("::1", 0)
+    except OptionError as error:
+        pytest.skip(str(error))  # a machine without IPv6
+    try:
+        assert opened.loopback
+        assert opened.address == f"http://[::1]:{opened.port}/?token={opened.token}"
+        assert opened.forwarded == f"{opened.port}:[::1]:{opened.port}"
+        with urllib.request.urlopen(opened.address, timeout=WAIT) as answer:
+            assert answer.status == 200
+        with connect(opened.address.replace("http", "ws").replace("/?", "/socket?")) as browser:
+            assert browser.protocol.state.name == "OPEN"
+    finally:
+        opened.close()
+
+
+@pytest.mark.parametrize("host", ["é" * 100, "a\0b", ":::::", "[::1]", "::1%no-such-device"])
+def test_a_host_that_is_none_is_refused(host):
+    with pytest.raises(OptionError, match="host and port"):
+        Server(host, 0)
 
 
 def test_other_machines_only_when_told_so():
