@@ -162,6 +162,27 @@ def check_file_name(field: str, value: object) -> str:
     return value
 
 
+def check_name(field: str, value: object, reserved: Collection[str] = ()) -> str:
+    """Return the value if it may name a registered entry, in lists with commas and in names of files.
+
+    Args:
+        field: of the name.
+        value: to be checked.
+        reserved: words with a meaning of their own where a name is expected.
+
+    Raises:
+        OptionError: if it is not.
+    """
+    name = check_file_name(field, value)
+    if "," in name:
+        raise OptionError(field, name, "choose another name, as lists of names have commas", "contains a comma")
+    if name != name.strip():
+        raise OptionError(field, name, "leave them out", "has spaces around it")
+    if name in reserved:
+        raise OptionError(field, name, "choose another name", "has a meaning of its own")
+    return name
+
+
 @contextlib.contextmanager
 def wrap_read_errors(field: str, path: Path, allowed: str, kind: type[ArtdeGymError]) -> Iterator[None]:
     """Convert every exception raised while an untrusted file is read to an error of the given kind.

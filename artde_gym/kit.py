@@ -179,7 +179,7 @@ class RobotKit:
         return (*own, PAYLOAD) if "cable" in self.capabilities else own
 
 
-ROBOTS: Registry[RobotKit] = Registry("robot", "artde_gym.robots", lambda kit: {kit.name: kit})
+ROBOTS: Registry[RobotKit] = Registry("robot", "artde_gym.robots", lambda kit: {kit.name: kit}, reserved=("all",))
 """All robots by name."""
 
 

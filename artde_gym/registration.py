@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import gymnasium as gym
 
+from artde_gym.arguments import check_name
 from artde_gym.deprecation import renamed_arguments
 from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from artde_gym.kit import ROBOTS
@@ -41,8 +42,11 @@ class GainRange(NamedTuple):
     high: float
 
 
+RESERVED = ("none", "matched")
+"""Words for no controller below a residual, and for the second pass of a multiverse."""
+
 _brought: Registry[ControllerSpec] = Registry(
-    "controller", "artde_gym.controllers", lambda specs: {spec.name: spec for spec in specs}
+    "controller", "artde_gym.controllers", lambda specs: {spec.name: spec for spec in specs}, reserved=RESERVED
 )
 """Controllers of this project and of installed plug-ins; each entry point names a sequence of specs."""
 _controllers: dict[str, ControllerSpec] = {}
@@ -71,8 +75,7 @@ def register_controller(
         OptionError: if the name is invalid or belongs to a controller of this project or of a plug-in.
         UnknownNameError: if an entry point does not have that form.
     """
-    if not (isinstance(name, str) and name):
-        raise OptionError("name of a controller", name, "a word")
+    check_name("name of a controller", name, RESERVED)
     for field, point in (("entry_point", entry_point), ("tuning_space", tuning_space)):
         if point is not None and not _is_entry_point(point):
             raise UnknownNameError(field, point, '"module:function"')

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import functools
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
+from artde_gym.arguments import check_name
 from artde_gym.deprecation import GROUPS, warn
 from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 
@@ -45,6 +46,7 @@ class Registry(Mapping[str, T], Generic[T]):
         group: group of the entry points (of any installed distribution) that provide entries.
         unpack: converts a loaded entry point to entries by name; None: it is one entry under its own name.
         own: initial entries.
+        reserved: words that name no entry.
     """
 
     def __init__(
@@ -53,8 +55,10 @@ class Registry(Mapping[str, T], Generic[T]):
         group: str,
         unpack: Callable[[Any], Mapping[str, T]] | None = None,
         own: Mapping[str, T] = MappingProxyType({}),
+        reserved: Collection[str] = (),
     ) -> None:
         self.noun, self.group = noun, group
+        self._reserved = reserved
         self._unpack = unpack
         self._entries: dict[str, T] = dict(own)
         self._loaded = False
@@ -63,7 +67,7 @@ class Registry(Mapping[str, T], Generic[T]):
         """Add an entry.
 
         Raises:
-            OptionError: if the name is taken and `replace` is not given.
+            OptionError: if the name is not valid (`artde_gym.arguments.check_name`), or taken and `replace` not given.
         """
         self._load()
         self._add(name, entry, replace)
@@ -116,6 +120,7 @@ class Registry(Mapping[str, T], Generic[T]):
             raise UnknownNameError(field, point.value, f"repair or uninstall {owner}", problem) from error
 
     def _add(self, name: str, entry: T, replace: bool) -> None:
+        check_name(f"name of {self.noun}", name, self._reserved)
         if name in self._entries and not replace:
             raise OptionError(self.noun, name, "choose another name, or replace=True", "is taken")
         self._entries[name] = entry

@@ -12,6 +12,9 @@ from typing import Any
 
 from artde_gym.registry import Registry
 
+CUSTOM = "custom"
+"""Name of the scenario for an environment that is evaluated with plain arguments."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Scenario:
@@ -32,7 +35,7 @@ class Scenario:
 
 
 SCENARIOS: Registry[Scenario] = Registry(
-    "scenario", "artde_gym.robots", lambda kit: {entry.name: entry for entry in kit.scenarios}
+    "scenario", "artde_gym.robots", lambda kit: {entry.name: entry for entry in kit.scenarios}, reserved=(CUSTOM,)
 )
 """All scenarios by name: those of every robot, and registered ones."""
 

@@ -34,6 +34,7 @@ from artde_gym.cli.arguments import (
 from artde_gym.cli.display import Display, terminal
 from artde_gym.cli.report import show_report
 from artde_gym.evaluation.environments import main_scenarios
+from artde_gym.scenarios import CUSTOM
 
 
 def evaluate(
@@ -72,7 +73,6 @@ def evaluate(
     The tables show the thesis' numbers beside those measured.
     """
     from artde_gym.evaluation import evaluate as run_evaluation  # heavy: only when the command runs
-    from artde_gym.evaluation.cells import CUSTOM
     from artde_gym.evaluation.console import print_result
 
     vectorized = vectorized_by(vectorized, backend)

@@ -8,6 +8,7 @@ from numbers import Real
 from types import MappingProxyType
 from typing import Any
 
+from artde_gym.arguments import check_name
 from artde_gym.deprecation import renamed_arguments
 from artde_gym.disturbances.friction import TERMS, friction
 from artde_gym.disturbances.loads import Effect
@@ -62,6 +63,9 @@ class DisturbanceSpec:
         one_of: parameters of which exactly one is given; the others are absent.
         effect: function that computes its loads; None for a kind that environments implement themselves.
         terms: parameters that are all zero where there is no effect; () for a kind that always has one.
+
+    Raises:
+        OptionError: for a name that cannot stand in a path.
     """
 
     name: str
@@ -73,6 +77,12 @@ class DisturbanceSpec:
     one_of: tuple[str, ...] = ()
     effect: Effect | None = None
     terms: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in (self.name, *(parameter.name for parameter in self.parameters)):
+            if "." in check_name("name of a disturbance or parameter", name):
+                todo = "choose another name, as paths have dots"
+                raise OptionError("name of a disturbance or parameter", name, todo, "contains a dot")
 
     def acts(self, entry: Mapping[str, Any]) -> bool:
         """Return True if a sampled entry has an effect."""

@@ -11,12 +11,10 @@ from artde_gym.errors import OptionError
 from artde_gym.evaluation import canonical
 from artde_gym.evaluation.environments import metrics_spec_of, single, vector, vector_of_one, with_engine
 from artde_gym.evaluation.metrics import Span
-from artde_gym.scenarios import Scenario
+from artde_gym.scenarios import CUSTOM, Scenario
 from artde_gym.scenarios import scenario as find_scenario
 
 DEFAULT_ENVIRONMENT = "BipedWalk-Payload-v0"
-CUSTOM = "custom"
-"""Name of the scenario for an environment that is evaluated with plain arguments."""
 
 
 class Cell(NamedTuple):

@@ -15,7 +15,7 @@ from rich.text import Text
 from artde_gym.evaluation import statistics, thesis
 from artde_gym.evaluation.environments import metrics_spec_of
 from artde_gym.evaluation.fitting_table import FittingTable
-from artde_gym.evaluation.registered import METRICS
+from artde_gym.evaluation.registered import METRICS, PEAK
 from artde_gym.evaluation.result import Result
 from artde_gym.metrics_spec import MetricsSpec
 from artde_gym.scenarios import SCENARIOS
@@ -163,7 +163,7 @@ class _Tables:
         table.collapse_padding = len(self._controllers) > WIDE
         for controller in self._controllers:
             table.add_column(controller, justify="right")
-        prefix = f"peak_error_{unit}_"
+        prefix = f"{PEAK}{unit}_"
         for event in (name.removeprefix(prefix) for name in self._result.metrics if name.startswith(prefix)):
             peaks = [self._means[scenario, name, prefix + event] for name in self._controllers]
             if not any(map(math.isfinite, peaks)):

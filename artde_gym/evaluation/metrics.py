@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 from artde_gym.arrays import Array
 from artde_gym.disturbances.kinds import NEVER
 from artde_gym.errors import OptionError
-from artde_gym.evaluation.registered import METRICS, Metric
+from artde_gym.evaluation.registered import METRICS, PEAK, RECOVERY, Metric
 from artde_gym.layout import Layout
 from artde_gym.metrics_spec import Fields, MetricsSpec, TrackedSignal, WatchedSignal
 
@@ -202,8 +202,8 @@ class Metrics:
                 for axis, i in effort.axes.items():
                     columns[f"rms_{effort.name}_{effort.unit}_{prefix}{axis}"] = squares.rms[:, i]
         for name, event in self._events.items():
-            columns[f"recovery_time_s_{name}"] = event.recovery_time(self._count, fell)
-            columns[f"peak_error_{unit}_{name}"] = scale * event.peak
+            columns[f"{RECOVERY}{name}"] = event.recovery_time(self._count, fell)
+            columns[f"{PEAK}{unit}_{name}"] = scale * event.peak
         columns[f"rmse_{unit}"] = scale * self._size.rms[:, 0]
         columns[f"iae_{unit}_s"] = scale * period * self._iae
         columns[f"itae_{unit}_s2"] = scale * period * self._itae
@@ -310,7 +310,7 @@ class _Watched:
         for event, found in self._events.items():
             columns[f"peak_{name}_{unit}_{event}"] = scale * found.peak
             if np.isfinite(self._watched.settling_band):
-                columns[f"recovery_time_s_{event}_{name}"] = found.recovery_time(count, fell)
+                columns[f"{RECOVERY}{event}_{name}"] = found.recovery_time(count, fell)
         return columns
 
 

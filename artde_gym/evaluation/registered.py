@@ -14,10 +14,12 @@ from artde_gym.metrics_spec import Fields
 from artde_gym.registry import Registry
 
 TAKEN = (
-    "cell", "controller", "duration_s", "env", "episode", "fall_reason", "fall_rate", "fell", "point", "reward",
-    "scenario", "seed", "time_to_fall_s",
+    "cell", "controller", "disturbances", "duration_s", "env", "episode", "fall_reason", "fall_rate", "fell", "point",
+    "reward", "scenario", "seed", "time_to_fall_s", "world",
 )  # fmt: skip
 """Columns that identify an episode and its ending."""
+RECOVERY, RECOVERED, PEAK = "recovery_time_s_", "recovered_", "peak_error_"
+"""Beginnings of what is measured after an event: a time that may be infinite, the share that it is not, an error."""
 
 Reduction = Literal["mean", "rms", "max", "min"]
 Signal = Callable[[Fields, Fields], Array | None]
@@ -50,6 +52,8 @@ class Metric:
             raise OptionError("name of a metric", self.name, "lowercase letters, digits and underscores")
         if self.name in TAKEN:
             raise OptionError("name of a metric", self.name, f"any name except {', '.join(TAKEN)}")
+        if self.name.startswith(after := (RECOVERY, RECOVERED, PEAK)):
+            raise OptionError("name of a metric", self.name, f"any name that begins with none of {', '.join(after)}")
         check_choice("reduction", self.reduction, get_args(Reduction))
 
 

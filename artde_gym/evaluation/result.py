@@ -14,6 +14,7 @@ from artde_gym.arrays import Array
 from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from artde_gym.evaluation import statistics
 from artde_gym.evaluation.pairing import DRAWN, episode_key, paired
+from artde_gym.evaluation.registered import RECOVERED, RECOVERY
 from artde_gym.evaluation.replay import replay_folder
 from artde_gym.evaluation.store import read_episodes, read_record, wanted_episodes
 from artde_gym.evaluation.wide_table import WideTable
@@ -22,8 +23,6 @@ from artde_gym.motion.replay import Replay
 _NOT_METRICS = ("seed", "episode", "fell", "duration_s")
 _OF_ALL = ("fell", "reward")
 """Metrics that are also meaningful for an episode that ended in a fall, as are times until an event."""
-RECOVERY = "recovery_time_s_"
-RECOVERED = "recovered_"
 _TIME_TO_FALL = "time_to_fall_s"
 
 

@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from artde_gym.disturbances.kinds import DISTURBANCES
-from artde_gym.evaluation.cells import CUSTOM
 from artde_gym.kit import PAYLOAD, ROBOTS, Push
 from artde_gym.motion.page import json_text
 from artde_gym.motion.scene import scene_of
@@ -18,7 +17,7 @@ from artde_gym.play.game import Game, comes
 from artde_gym.play.player import Player
 from artde_gym.play.record import MAGNITUDE
 from artde_gym.registration import make_controller, registered_controllers
-from artde_gym.scenarios import SCENARIOS
+from artde_gym.scenarios import CUSTOM, SCENARIOS
 
 PUSH_FORCE = 10.0  # N, initial force of a push unless the robot's kit sets one
 LARGEST_PUSH = 5.0  # over the initial one

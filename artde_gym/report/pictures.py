@@ -19,7 +19,6 @@ from typing import Any, NamedTuple
 from PIL import Image
 
 from artde_gym.errors import ArtdeGymError
-from artde_gym.evaluation.cells import CUSTOM
 from artde_gym.evaluation.environments import robot_of
 from artde_gym.evaluation.metrics import Span, events_of
 from artde_gym.kit import ROBOTS
@@ -27,6 +26,7 @@ from artde_gym.registration import registered_controllers
 from artde_gym.report.answer import metric_of, ranking
 from artde_gym.report.html import figure, paragraph
 from artde_gym.report.run import Run, nested
+from artde_gym.scenarios import CUSTOM
 from artde_gym.video.frames import Frame, render_frames
 from artde_gym.video.recording import video
 

@@ -9,7 +9,7 @@ import pandas as pd
 
 from artde_gym.evaluation import statistics, thesis
 from artde_gym.evaluation.console import ALL, DIGITS, REFERENCE, UNITS, digits_of, measured, share_text, time_text
-from artde_gym.evaluation.result import RECOVERY
+from artde_gym.evaluation.registered import PEAK, RECOVERY
 from artde_gym.evaluation.statistics import Estimate
 from artde_gym.palette import styles
 from artde_gym.report.chart import Axis, Chart
@@ -95,7 +95,7 @@ def events(run: Run, scenario: str) -> str:
     """Return peak error and recovery time after each push and drop."""
     result, main = run.result, run.tracking(scenario).errors[0]
     text, digits = UNITS[main.unit]
-    peak = f"peak_error_{main.unit}_"
+    peak = f"{PEAK}{main.unit}_"
     rows = []
     for event in (name.removeprefix(peak) for name in result.metrics if name.startswith(peak)):
         for name in result.controllers:

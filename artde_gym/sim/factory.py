@@ -95,7 +95,11 @@ _MUJOCO = EngineSpec(
 )
 
 ENGINES: Registry[EngineSpec] = Registry(
-    "engine", "artde_gym.engines", lambda spec: {spec.name: spec}, {spec.name: spec for spec in (_BULLET, _MUJOCO)}
+    "engine",
+    "artde_gym.engines",
+    lambda spec: {spec.name: spec},
+    {spec.name: spec for spec in (_BULLET, _MUJOCO)},
+    reserved=("both", "fastest"),
 )
 """All engines by name; the first available one is the default."""
 

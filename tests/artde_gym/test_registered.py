@@ -11,11 +11,16 @@ import pandas as pd
 import pytest
 
 from artde_gym.disturbances import DISTURBANCES
+from artde_gym.disturbances.kinds import DisturbanceSpec, Parameter
 from artde_gym.errors import OptionError, StoreError
 from artde_gym.evaluation import Result, evaluate, register_metric
 from artde_gym.evaluation.registered import METRICS
+from artde_gym.kit import ROBOTS
+from artde_gym.registry import Registry
 from artde_gym.report.report import write_report
-from artde_gym.scenarios import SCENARIOS, Scenario, register_scenario
+from artde_gym.scenarios import CUSTOM, SCENARIOS, Scenario, register_scenario
+from artde_gym.sim.factory import ENGINES
+from artde_gym.studies.reproduce.claims import CLAIMS
 
 WALK = "BipedWalk-Payload-v0"
 
@@ -158,7 +163,38 @@ def test_a_folder_keeps_its_metrics(tmp_path):
         evaluate(["tde"], WALK, **options)
 
 
-@pytest.mark.parametrize("name", ["fell", "Speed", "", 3, "seed"])
+UNFIT = ["", 3, "a/b", "a\\b", "a,b", " a", "a\n", ".a", "é" * 101, "a" * 101]
+REGISTRIES: dict[str, tuple[Registry[Any], list[str]]] = {
+    "scenario": (SCENARIOS, [CUSTOM]),
+    "robot": (ROBOTS, ["all"]),
+    "engine": (ENGINES, ["both", "fastest"]),
+    "disturbance": (DISTURBANCES, []),
+    "metric": (METRICS, []),
+    "claims": (CLAIMS, []),
+}
+
+
+@pytest.mark.parametrize("noun", REGISTRIES)
+def test_what_cannot_be_a_name_is_refused_at_registration(noun):
+    registry, reserved = REGISTRIES[noun]
+    before = dict(registry)
+    for name in [*UNFIT, *reserved]:
+        with pytest.raises(OptionError, match=f"name of {noun}"):
+            registry.register(name, next(iter(before.values()), None), replace=True)
+    assert dict(registry) == before
+
+
+@pytest.mark.parametrize(("name", "parameter"), [("a.b", "c"), ("a", "b.c"), ("a,b", "c")])
+def test_a_kind_and_its_parameters_have_names_that_paths_can_hold(name, parameter):
+    with pytest.raises(OptionError, match="name of a disturbance or parameter"):
+        DisturbanceSpec(name, "", (Parameter(parameter, "", 0.0, 1.0, None, ""),), "joints")
+
+
+AFTER_AN_EVENT = ["recovery_time_s_mine", "recovered_mine", "peak_error_deg_mine"]
+OF_STUDIES = ["world", "disturbances"]
+
+
+@pytest.mark.parametrize("name", ["fell", "Speed", "", 3, "seed", *AFTER_AN_EVENT, *OF_STUDIES])
 def test_a_name_is_one_of_a_new_column(name):
     with pytest.raises(OptionError, match="name of a metric"):
         register_metric(name, lambda fields, _: fields["qd"][..., 0])

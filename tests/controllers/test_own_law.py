@@ -191,6 +191,8 @@ def test_further_gains_need_defaults_and_controllers_gains() -> None:
 def test_names_of_this_projects_controllers_are_taken(law: Any) -> None:
     with pytest.raises(OptionError, match="name of a controller is 'artde'"):
         controllers.register_law("artde", "leaky_law:LEAKY")
+    with pytest.raises(OptionError, match="name of a controller 'a/b' contains a slash"):
+        controllers.register_law("a/b", "leaky_law:LEAKY")
 
 
 def test_every_law_of_this_project_fits_its_family_and_a_robot() -> None:

@@ -123,8 +123,8 @@ def test_entry_points_have_two_parts(registry, point):
         artde_gym.register_controller("own", point)
 
 
-@pytest.mark.parametrize("name", ["", 3, None])
-def test_a_name_is_a_word(registry, name):
+@pytest.mark.parametrize("name", ["", 3, None, "a/b", "a,b", " a", "none", "matched"])
+def test_a_name_is_one_of_files_and_lists(registry, name):
     with pytest.raises(OptionError, match="name of a controller"):
         artde_gym.register_controller(name, "module:make")
 

@@ -39,7 +39,7 @@ import pandas as pd
 
 from artde_gym.deprecation import takes_old_names
 from artde_gym.evaluation import statistics
-from artde_gym.evaluation.cells import CUSTOM, Cell
+from artde_gym.evaluation.cells import Cell
 from artde_gym.evaluation.evaluate import run_plan
 from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.plan import Plan
@@ -47,6 +47,7 @@ from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.rollout import Policy
 from artde_gym.evaluation.tasks import Update
 from artde_gym.kit import Harder
+from artde_gym.scenarios import CUSTOM
 from artde_gym.studies.frontier.axis import GAINS, axis
 from artde_gym.studies.frontier.bisection import search
 from artde_gym.studies.frontier.design import Design
