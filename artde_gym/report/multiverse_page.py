@@ -291,7 +291,11 @@ def _ratios(found: Multiverse) -> list[str]:
         ratios = np.exp(-known)
         mine, theirs = verdict.claim.controllers
         median = statistics.median(ratios)
-        head = f"{mine} over {theirs}: {median.value:.2f} ({median.low:.2f}..{median.high:.2f})"
+        what = "" if verdict.claim.metric is None else f", {verdict.claim.metric}"
+        interval = (
+            f" ({median.low:.2f}..{median.high:.2f})" if math.isfinite(median.low) else ""
+        )  # of six worlds or more
+        head = f"{mine} over {theirs}{what}: {median.value:.2f}{interval}"
         charts[head] = _histogram(head, ratios)
     if not charts:
         return [paragraph("No two controllers are compared where both survive.", "soft")]

@@ -112,6 +112,7 @@ def quadrotor(tmp_path_factory) -> Any:
         ({"vectorized": "batches"}, "vectorized is 'batches'"),
         ({"env": None}, "neither env nor scenario"),
         ({"figure": ["y"]}, "one or two of the factors: x"),
+        ({"figure": [["x"]]}, "one or two of the factors: x"),
         ({"set": {"disturbances.payload.mass": 1.0}}, "needs a scenario"),
         (
             {"disturbances": {}, "set": {"disturbances.payload.position.3": 1.0}},
@@ -244,6 +245,12 @@ def test_the_second_pass_has_the_mean_gain_of_the_same_world(biped, quadrotor):
         assert table.xs("tde", level=1)["robust_gain_mean" + min(gains)].isna().all()
 
 
+def test_the_second_pass_keeps_the_gains_that_are_given_to_it():
+    given = {"tde+kd": {"m_bar": 0.08, "c": 1.0}}
+    point = design({**SMALL, "gains": given, "matched": "artde"}).matched_point(0, {"c": 0.3})
+    assert point.gains == {"m_bar": 0.08, "c": 0.3}
+
+
 def test_results_depend_neither_on_workers_nor_on_the_order_of_runs(biped, tmp_path):
     fewer = multiverse({**BIPED, "worlds": 2}, tmp_path)
     assert len(fewer.episodes) == 6
@@ -363,6 +370,17 @@ def test_the_factor_that_decides_is_found():
     assert what_decides(factors, ["tie"] * 197 + ["holds"] * 3) is None
 
 
+@pytest.mark.parametrize("size", [1e-300, 1.0, 1e300])
+def test_factors_of_any_size_decide(size):
+    pytest.importorskip("sklearn")
+    factors = np.random.default_rng(0).uniform(size=(60, 2)) * [1.0, size]
+    found = what_decides(factors, ["a" if x > 0.5 * size else "b" for x in factors[:, 1]])
+    assert found is not None
+    assert found.accuracy > 0.95
+    assert found.tree.factor == 1
+    assert found.tree.threshold == pytest.approx(0.5 * size, rel=0.1)
+
+
 def test_without_scikit_learn_everything_else_works(monkeypatch, biped, tmp_path):
     for name in ("sklearn", "sklearn.tree", "sklearn.inspection", "sklearn.model_selection"):
         monkeypatch.setitem(sys.modules, name, None)
@@ -394,6 +412,7 @@ def test_a_report_shows_every_claim_and_a_command(biped):
         assert claim.text in text
     assert "artde-gym evaluate" in text
     assert "<svg" in text
+    assert "(nan" not in text
 
 
 @pytest.mark.parametrize(

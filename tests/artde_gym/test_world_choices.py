@@ -68,8 +68,17 @@ def test_no_factor_sets_what_all_worlds_share_or_have_of_their_own(path: str) ->
 
 
 def test_a_path_is_set_once() -> None:
-    with pytest.raises(OptionError, match="in 'set', and of a factor"):
-        design(flight("disturbances.payload.mass", [0.1], set={"disturbances.payload.mass": 0.2}))
+    for path, values in (("disturbances.payload.mass", [0.1]), ("disturbances.payload", [0.1]), ("disturbances", [{}])):
+        with pytest.raises(OptionError, match="in 'set', and of a factor"):
+            design(flight(path, values, set={"disturbances.payload.mass": 0.2}))
+
+
+def test_a_value_inside_another_overrides_it_in_whatever_order() -> None:
+    outer = {"path": "disturbances.payload", "choice": [0.1], "source": "a guess"}
+    inner = {"path": "disturbances.payload.mass", "choice": [0.2], "source": "a guess"}
+    for factors in ({"a": outer, "b": inner}, {"b": inner, "a": outer}):
+        (point, *_) = design({**FLIGHT, "factors": factors}).points().values()
+        assert point.cell.kwargs["disturbances"]["payload"] == {"mass": 0.2}
 
 
 def test_the_message_names_the_distribution_once() -> None:

@@ -73,7 +73,8 @@ def what_decides(factors: Array, classes: Sequence[str]) -> Deciding | None:
     kept = np.isin(classes, names[counts >= FOLDS])
     if (counts >= FOLDS).sum() < 2:
         return None
-    x, y = factors[kept], np.array(classes, dtype=str)[kept]
+    exponents = np.frexp(np.nan_to_num(np.abs(factors)).max(axis=0))[1]
+    x, y = np.ldexp(factors[kept], -exponents), np.array(classes, dtype=str)[kept]  # trees have single precision
 
     def fitted(rows: NDArray[Any]) -> Any:
         made = trees.DecisionTreeClassifier(max_depth=DEPTH, min_samples_leaf=SMALLEST, random_state=0)
@@ -89,7 +90,9 @@ def what_decides(factors: Array, classes: Sequence[str]) -> Deciding | None:
     baseline = float(counts[counts >= FOLDS].max() / len(y))
     kinds = tuple(str(name) for name in whole.classes_)
     spread = np.std(lost, axis=0, ddof=1) / np.sqrt(FOLDS)
-    return Deciding(kinds, float(np.mean(accuracy)), baseline, np.mean(lost, axis=0), spread, _node(whole, x, y, kinds))
+    return Deciding(
+        kinds, float(np.mean(accuracy)), baseline, np.mean(lost, axis=0), spread, _node(whole, x, y, kinds, exponents)
+    )
 
 
 def rank_correlations(factors: Array, values: Array) -> tuple[Array, float]:
@@ -113,8 +116,8 @@ def _scikit_learn() -> tuple[Any, Any, Any]:
     return found[0], found[1], found[2]
 
 
-def _node(fitted: Any, x: Array, y: NDArray[Any], classes: Sequence[str]) -> Node:
-    """Read a fitted tree: scikit-learn holds it as arrays."""
+def _node(fitted: Any, x: Array, y: NDArray[Any], classes: Sequence[str], exponents: NDArray[Any]) -> Node:
+    """Read a fitted tree, which scikit-learn holds as arrays, of factors that were divided by powers of two."""
     inside = fitted.decision_path(x).toarray().astype(bool)
     arrays = fitted.tree_
 
@@ -123,6 +126,7 @@ def _node(fitted: Any, x: Array, y: NDArray[Any], classes: Sequence[str]) -> Nod
         if arrays.children_left[i] < 0:
             return Node(counts)
         below, above = (read(int(children[i])) for children in (arrays.children_left, arrays.children_right))
-        return Node(counts, int(arrays.feature[i]), float(arrays.threshold[i]), below, above)
+        factor = int(arrays.feature[i])
+        return Node(counts, factor, float(np.ldexp(arrays.threshold[i], exponents[factor])), below, above)
 
     return read(0)

@@ -112,14 +112,14 @@ class Design:
 
     def matched_point(self, number: int, gains: Mapping[str, float]) -> SweepCell:
         """Return the second pass in one world."""
-        point = self._point(self.worlds[number], ABLATION, {ABLATION: dict(gains)})
+        point = self._point(self.worlds[number], ABLATION, gains)
         return dataclasses.replace(point, controller=MATCHED, id=f"{point.id}-{MATCHED}")
 
-    def _point(self, world: World, name: str, gains: Mapping[str, Any] | None = None) -> SweepCell:
+    def _point(self, world: World, name: str, gains: Mapping[str, float] | None = None) -> SweepCell:
         paths = {path: world.factors[factor.name] for factor in self.factors for path in factor.paths}
         settings = settings_of({**self.fixed, "controller": name, "seed": world.seed}, paths)
         if gains is not None:
-            settings["gains"] = gains
+            settings["gains"] = {name: {**settings["gains"].get(name, {}), **gains}}
         return point_of(settings, self.vectorized, {*self.controllers, ABLATION})
 
 
@@ -162,7 +162,7 @@ def design(given: Mapping[str, Any]) -> Design:
     factors = _factors(given.get("factors"))
     fixed = _fixed(given)
     for path in given.get("set", {}):
-        if any(path in factor.paths for factor in factors):
+        if any(path == own or path.startswith(f"{own}.") for factor in factors for own in factor.paths):
             raise OptionError("path", path, "leave one of them", "is in 'set', and of a factor")
     labels = (*controllers, MATCHED) if matched else controllers
     claims = read_claims(given.get("claims"), _robot(fixed), labels)
@@ -228,6 +228,7 @@ def _factors(given: Any) -> tuple[Factor, ...]:
 def _figure(given: Any, factors: tuple[Factor, ...]) -> tuple[Factor, Factor | None]:
     known = {factor.name: factor for factor in factors}
     names = list(known)[:2] if given is None else given
-    if not (isinstance(names, list) and 1 <= len(names) <= 2 and all(name in known for name in names)):
+    good = isinstance(names, list) and all(isinstance(name, str) and name in known for name in names)
+    if not (good and 1 <= len(names) <= 2):
         raise OptionError("figure", given, f"one or two of the factors: {', '.join(known)}")
     return known[names[0]], known[names[1]] if len(names) > 1 else None

@@ -267,10 +267,13 @@ def _draw(path: str, distribution: Mapping[str, list[Any]], seed: int, number: i
 
 
 def settings_of(fixed: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings of one cell: the fixed ones, overridden by whole settings, then by single values inside."""
+    """Return the settings of one cell: the fixed ones, overridden by whole settings, then by single values inside.
+
+    A value inside another one overrides it in whatever order they are given.
+    """
     settings = dict(fixed)
     settings |= {path: value for path, value in values.items() if path in SETTINGS}
-    for path, value in values.items():
+    for path, value in sorted(values.items(), key=lambda item: item[0].count(".")):
         head, _, rest = path.partition(".")
         if path in SETTINGS:
             continue
