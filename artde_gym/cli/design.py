@@ -7,13 +7,19 @@ from typing import Annotated
 
 import typer
 
-from artde_gym.cli.arguments import WALK, EnvKwargs, joined, json_object
+from artde_gym.cli.arguments import WALK, joined, json_object
 
 
 def design(
     robot: Annotated[str | None, typer.Option(help=f"Name of the robot. Default: that of {WALK}.")] = None,
     env: Annotated[str | None, typer.Option(help="Environment id, in place of the robot.")] = None,
-    env_kwargs: EnvKwargs = None,
+    env_kwargs: Annotated[
+        str | None,
+        typer.Option(
+            help="JSON; arguments of an arm's environment, of whose disturbances encoder_bits alone has a part; of any "
+            "other robot those of its motion."
+        ),
+    ] = None,
     law: Annotated[str, typer.Option(help="Law with a time-delay estimate; see `list controllers`.")] = "tde",
     preset: Annotated[str | None, typer.Option(help="Preset of the law's gains; see `list controllers`.")] = None,
     gains: Annotated[str | None, typer.Option(help='JSON; override gains of the preset, e.g. {"m_bar": 0.08}.')] = None,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -30,6 +30,8 @@ from artde_gym.cli.arguments import (
 )
 from artde_gym.cli.display import Display, terminal
 from artde_gym.cli.report import show_report
+from artde_gym.errors import OptionError
+from artde_gym.evaluation import canonical
 from artde_gym.files import check_figure, write_atomically
 from artde_gym.kit import ROBOTS
 
@@ -78,7 +80,7 @@ def frontier(
     if figure is not None:
         check_figure("--figure", figure)
     console, folder = terminal(), folder_of(out)
-    scenarios = [None] if scenario is None else names("--scenario", scenario)
+    scenarios = [None] if scenario is None else _checked(names("--scenario", scenario), env, vary, kwargs)
     for one in scenarios:
         with Display(console) as display:
             found = run_frontier(
@@ -114,6 +116,21 @@ def frontier(
             show_report(found.folder, console)
         if not found.complete:
             raise typer.Exit(130)
+
+
+def _checked(scenarios: list[str], env: str, vary: str, kwargs: dict[str, Any]) -> list[str]:
+    """Return the scenarios if each of them makes a test, so that a wrong one shows before the first one has run.
+
+    Raises:
+        OptionError, UnknownNameError: otherwise.
+    """
+    from artde_gym.studies.frontier.standard import standard_test
+
+    if again := canonical.twice(scenarios):
+        raise OptionError("scenario", again, "name each one once", "is given twice")
+    for one in scenarios:
+        standard_test(env, vary, kwargs, one)
+    return scenarios
 
 
 def _figures(found: Frontier, figure: Path | None, scenario: str | None) -> list[Path]:

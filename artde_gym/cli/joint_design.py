@@ -60,6 +60,8 @@ def show_design(
     if figure is not None:
         check_figure("figure", figure)
     if env is not None and DRIVES[name].workspace is not None:
+        if preset is not None:
+            raise OptionError("preset", preset, "leave it out", "does not go with an arm, whose gains are derived")
         show_workspace(env, given, law, gains, period, figure, as_json)
         return
     check_motion(name, _motion(name, switches), given)

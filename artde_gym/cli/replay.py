@@ -12,7 +12,6 @@ from artde_gym.cli.arguments import (
     Engine,
     EnvKwargs,
     Gains,
-    Seed,
     environment_kwargs,
     given_disturbances,
     json_object,
@@ -35,7 +34,7 @@ def replay(
         int | None, typer.Option(help="Number. Default: worst, median and best of the folder, or 0.")
     ] = None,
     env: Annotated[str | None, typer.Option(help="Without a folder: environment id.")] = None,
-    seed: Seed = 0,
+    seed: Annotated[int | None, typer.Option(help="Without a folder: base random seed. Default: 0.")] = None,
     engine: Engine = None,
     disturbances: Disturbances = None,
     env_kwargs: EnvKwargs = None,
@@ -63,7 +62,7 @@ def replay(
                 names("--controllers", "artde" if controllers is None else controllers),
                 env,
                 scenario=scenario,
-                seed=seed,
+                seed=seed or 0,
                 episode=episode or 0,
                 disturbances=given_disturbances(disturbances),
                 env_kwargs=environment_kwargs(env_kwargs, engine),
@@ -72,7 +71,7 @@ def replay(
             )
         else:
             own = {"--env": env, "--engine": engine, "--disturbances": disturbances, "--env-kwargs": env_kwargs}
-            for option, value in {**own, "--gains": gains, "--seed": seed or None}.items():
+            for option, value in {**own, "--gains": gains, "--seed": seed}.items():
                 if value is not None:
                     raise OptionError(
                         option, value, "leave it out", "does not go with a folder, whose episodes stay as they were run"

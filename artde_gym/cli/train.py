@@ -21,7 +21,7 @@ from artde_gym.cli.arguments import (
 )
 from artde_gym.cli.display import terminal, words
 from artde_gym.cli.report import show_report
-from artde_gym.errors import MissingDependencyError
+from artde_gym.errors import MissingDependencyError, OptionError
 
 
 def train(
@@ -40,12 +40,10 @@ def train(
     action_mode: Annotated[
         str, typer.Option(help="Meaning of an action. Default: the robot's; see the model cards.")
     ] = "",
-    action_scale: Annotated[
-        float, typer.Option(help="Largest residual. Default: the action mode's.", show_default=False)
-    ] = 0.0,
+    action_scale: Annotated[float | None, typer.Option(help="Largest residual. Default: the action mode's.")] = None,
     decision_period: Annotated[
-        float, typer.Option(help="Time between two decisions, in s. Default: the robot's.", show_default=False)
-    ] = 0.0,
+        float | None, typer.Option(help="Time between two decisions, in s. Default: the robot's.")
+    ] = None,
     channel: Annotated[str | None, typer.Option(hidden=True)] = None,
     limit: Annotated[float | None, typer.Option(hidden=True)] = None,
     gated: Annotated[bool, typer.Option(help="Fade the biped's residual in by tilt and velocity error.")] = True,
@@ -68,14 +66,17 @@ def train(
     if limit is not None:
         renamed_option("--limit", "--action-scale")
         action_scale = limit
+    for option, value in (("--action-scale", action_scale), ("--decision-period", decision_period)):
+        if value == 0:
+            raise OptionError(option, value, "above 0; leave it out for the default")
     kwargs = environment_kwargs(env_kwargs, engine)
     config = ResidualConfig(
         task(env).robot,
         base,
         json_object("--gains", gains) or {},
         action_mode=action_mode,
-        decision_period=decision_period,
-        action_scale=action_scale,
+        decision_period=decision_period or 0.0,
+        action_scale=action_scale or 0.0,
         gated=gated,
     )
     training = Training(

@@ -33,25 +33,35 @@ def show_workspace(
     """
     if law not in delayed():
         raise OptionError("law", law, ", ".join(delayed()))
-    found = _designed(env_id, env_kwargs, gains, period)
+    found, left_out = _designed(env_id, env_kwargs, gains, period)
     if figure is not None:
         drawing = draw(found).encode()
         write_atomically(figure, lambda file: file.write(drawing))
     if as_json:
-        print(json.dumps({"robot": found.spec.name, "law": law, "env": env_id, **found.to_dict()}, indent=2))
+        told = {"robot": found.spec.name, "law": law, "env": env_id, "left_out": left_out, **found.to_dict()}
+        print(json.dumps(told, indent=2))
         return
-    _print(found, terminal())
+    console = terminal()
+    _print(found, console)
+    if left_out:
+        words = f"Left out, since a design is that of the nominal model: {', '.join(left_out)}."
+        console.print(words, markup=False, highlight=False)
 
 
-def _designed(env_id: str, env_kwargs: dict[str, Any], gains: dict[str, Any], period: float | None) -> WorkspaceDesign:
+def _designed(
+    env_id: str, env_kwargs: dict[str, Any], gains: dict[str, Any], period: float | None
+) -> tuple[WorkspaceDesign, list[str]]:
+    """Return the design for the arm of an environment, and the kinds of its disturbances that have no part in it."""
     env: Any = gym.make(env_id, disable_env_checker=True, **env_kwargs).unwrapped
     try:
         env.reset(seed=0)
-        bits = env.sampled_disturbances.get("encoder_bits", {}).get("bits")
+        sampled = dict(env.sampled_disturbances)
+        bits = sampled.pop("encoder_bits", {}).get("bits")
         workspace = DRIVES[env.robot_name].workspace
         if workspace is None:
             raise OptionError("env", env_id, "an environment of an arm")
-        return workspace(env.nominal_robot, env.control_period if period is None else period, gains, bits)
+        found = workspace(env.nominal_robot, env.control_period if period is None else period, gains, bits)
+        return found, list(sampled)
     finally:
         env.close()
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from html import escape
 from pathlib import Path
 from typing import Any
 
 from artde_gym.arguments import wrap_read_errors
-from artde_gym.errors import StoreError
+from artde_gym.errors import OptionError, StoreError
 from artde_gym.evaluation.environments import physics_of, robot_of
 from artde_gym.evaluation.provenance import MIXED
 from artde_gym.evaluation.store import write_atomically
@@ -46,25 +46,35 @@ def write_report(
 
     Raises:
         StoreError: if the folder has nothing to report.
+        OptionError: for pictures or videos of anything but an evaluation.
     """
     folder = Path(folder)
     if not folder.is_dir():
         raise StoreError(
             "results folder", str(folder), "a folder that `evaluate`, `frontier`, `multiverse` or `train` wrote"
         )
+    study = _study(folder)
+    for name, asked in (("pictures", pictures), ("videos", videos)):
+        if asked and study is not None:
+            raise OptionError(name, asked, "leave it out", "goes with the results of `evaluate` and `reproduce` alone")
     wanted = "one that `evaluate`, `frontier`, `multiverse` or `train` of this release wrote"
     with wrap_read_errors("results folder", folder, wanted, StoreError):
-        if (folder / RECORD).exists():
-            text = _frontier(folder)
-        elif (folder / training_page.RECORD).exists():
-            text = _training(training_page.read_training(folder))
-        elif last_run(folder) is not None:
-            text = _multiverse(folder)
+        if study is not None:
+            text = study(folder)
         else:
             run = Run.read(folder)
             text = _evaluation(run, SnapshotSet(run, pictures, videos, on_progress))
     write_atomically(folder / NAME, lambda file: file.write(text.encode()))
     return folder / NAME
+
+
+def _study(folder: Path) -> Callable[[Path], str] | None:
+    """Return what writes the report of a study's or a training's folder; None for that of an evaluation."""
+    if (folder / RECORD).exists():
+        return _frontier
+    if (folder / training_page.RECORD).exists():
+        return lambda folder: _training(training_page.read_training(folder))
+    return None if last_run(folder) is None else _multiverse
 
 
 def _evaluation(run: Run, album: SnapshotSet) -> str:

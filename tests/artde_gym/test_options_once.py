@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from artde_gym.cli import app
 from artde_gym.errors import ArtdeGymError, UnknownNameError
 from artde_gym.kit import ROBOTS, find_robot
 
+ARM = "ArmTrack-Payload-v0"
 SCENARIO = ["--scenario", "Q1", "--controllers", "tde", "--episodes", "1", "--workers", "1"]
 
 
@@ -65,6 +67,43 @@ def test_design_refuses_an_option_that_would_do_nothing_or_cannot_be_met(words: 
 )
 def test_a_study_refuses_its_figure_before_it_runs(study: list[str], figure: str) -> None:
     assert figure in refusal(*study, "--figure", figure)
+
+
+@pytest.mark.parametrize("seed", ["0", "1"])
+def test_a_seed_does_not_go_with_a_folder_even_if_it_is_the_default(seed: str, tmp_path: Path) -> None:
+    assert f"--seed {seed} does not go with a folder" in refusal("replay", str(tmp_path), "--seed", seed)
+
+
+@pytest.mark.parametrize("option", ["--action-scale", "--decision-period"])
+def test_a_training_refuses_zero_in_place_of_the_default(option: str, tmp_path: Path) -> None:
+    words = ["train", "--env", "BipedWalk-Payload-v0", "--out", str(tmp_path / "out"), option, "0"]
+    assert f"{option} is 0.0; allowed: above 0" in refusal(*words)
+
+
+def test_a_frontier_knows_all_of_its_scenarios_before_the_first_one_runs(tmp_path: Path) -> None:
+    words = ["frontier", "--controllers", "tde", "--vary", "payload.mass", "--out", str(tmp_path / "out")]
+    assert "one of the robot in BipedPush-v0" in refusal(*words, "--scenario", "S1,Q1")
+    assert "did you mean 'S2'" in refusal(*words, "--scenario", "S1,s2")
+    assert "is given twice" in refusal(*words, "--scenario", "S1,S1")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("asked", ["pictures", "videos"])
+def test_a_report_of_a_study_has_neither_pictures_nor_videos(asked: str, tmp_path: Path) -> None:
+    (tmp_path / "frontier.json").write_text("{}")
+    assert f"{asked} True goes with the results of" in refusal("report", str(tmp_path), f"--{asked}")
+
+
+def test_an_arms_design_has_no_preset() -> None:
+    assert "preset 'designed' does not go with an arm" in refusal("design", "--env", ARM, "--preset", "designed")
+
+
+def test_a_design_names_the_disturbances_that_have_no_part_in_it() -> None:
+    given = '{"disturbances": {"payload": 1.0, "encoder_bits": 16, "joint_friction": {"scale": 2.0}}}'
+    outcome = CliRunner().invoke(app, ["design", "--env", ARM, "--env-kwargs", given, "--json"])
+    told = json.loads(outcome.output)
+    assert told["left_out"] == ["payload", "joint_friction"]
+    assert told["encoder_bits"] == 16
 
 
 @pytest.mark.parametrize("command", ["evaluate", "frontier", "tune", "video", "replay", "play"])
