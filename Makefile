@@ -1,6 +1,7 @@
 # One target a habit. Everything is installed into .venv, which `make clean` removes.
 # Any CPython from 3.11 on: make PYTHON=python3.13 VENV=.venv-3.13 EXTRAS=test,docs,video tests
-PYTHON ?= python3.11
+# that of PyBullet's wheels, if there is one
+PYTHON ?= $(shell command -v python3.11 || echo python3)
 VENV ?= .venv
 EXTRAS ?= dev,docs,rl,video
 LEAST ?= 0

@@ -15,8 +15,11 @@ from artde_gym.evaluation.provenance import provenance
 INTRODUCTION = """\
 # Benchmark
 
-Times hold for one machine; ratios (no unit) were measured in one run, all variants in turns, and hold elsewhere, too. A
-missed target is marked. This command writes the page on your machine:
+Times hold for one machine; ratios (no unit) were measured in one run, all variants in turns, and carry over to others.
+A missed target is marked. *Bare* is the engine alone, without the environment around it; a *closed loop* is
+environment and controller. A control period of the biped and the arm is 1 ms, of the quadrotor 15 ms: 1000 us, or
+15 000 us, over the time of a closed loop is how many times faster than real time it runs. This command writes the
+page on your machine:
 
     {command}
 

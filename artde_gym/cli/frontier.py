@@ -46,10 +46,12 @@ def frontier(
     vary: Annotated[str, typer.Option(help=f"Parameter to vary; with a default range: {', '.join(VARIED)}.")],
     controllers: Controllers = "tde,atde,artde",
     env: Annotated[str, typer.Option(help="Environment id.")] = "BipedPush-v0",
-    low: Annotated[float | None, typer.Option(help="Smallest value, in the parameter's unit.")] = None,
-    high: Annotated[float | None, typer.Option(help="Largest value.")] = None,
-    tolerance: Annotated[float | None, typer.Option(help="Final width of the bracket.")] = None,
-    harder: Annotated[str | None, typer.Option(help="Harder values: larger or smaller.")] = None,
+    low: Annotated[
+        float | None, typer.Option(help="Smallest value, in the parameter's unit. Default: see `list frontiers`.")
+    ] = None,
+    high: Annotated[float | None, typer.Option(help="Largest value. Default: as for --low.")] = None,
+    tolerance: Annotated[float | None, typer.Option(help="Step between levels. Default: as for --low.")] = None,
+    harder: Annotated[str | None, typer.Option(help="Harder values: larger or smaller. Default: as for --low.")] = None,
     episodes: Annotated[int, typer.Option(help="Seeded episodes per controller and level.")] = 20,
     seed: Seed = 0,
     workers: Workers = None,
@@ -65,7 +67,8 @@ def frontier(
         str | None, typer.Option(help="In place of the standard test's, comma-separated; a folder inside for each.")
     ] = None,
     grid: Annotated[
-        bool, typer.Option("--grid", help="Run every level, not only those of a bisection; 50 % points, too.")
+        bool,
+        typer.Option("--grid", help="Run every level, not only those of a bisection; find where half survive, too."),
     ] = False,
     figure: Annotated[Path | None, typer.Option(help="Another place for frontier.svg, one file a scenario.")] = None,
     allow_mixed: AllowMixed = False,

@@ -78,7 +78,7 @@ def show_design(
         print(json.dumps({"robot": name, "law": law, "loops": [one.to_dict() for one in found]}, indent=2))
         return
     for one in found:
-        _print(one, terminal())
+        _print(f"{name} under {law}", one, terminal())
 
 
 def _robot(robot: str | None, env: str | None) -> str:
@@ -139,12 +139,14 @@ def _file(path: Path, one: Design, several: bool) -> Path:
     return path.with_stem(f"{path.stem}-{one.loop.name}") if several else path
 
 
-def _print(one: Design, console: Console) -> None:
+def _print(judged: str, one: Design, console: Console) -> None:
     loop = one.loop
     newton = "N" if loop.unit == "kg" else "Nm"
     length = "m" if loop.unit == "kg" else "rad"
     table = FittingTable("joint")
-    table.title = f"{loop.name}, L = {1e3 * one.period:g} ms ({loop.unit}, {newton}/{length}, {newton} s/{length})"
+    table.title = (
+        f"{judged}: {loop.name}, L = {1e3 * one.period:g} ms ({loop.unit}, {newton}/{length}, {newton} s/{length})"
+    )
     for title in ("m_bar", "valid below", "K_d m_bar/L", "m_bar/L"):
         table.add_column(title, justify="right")
     for joint in one.to_dict()["joints"]:

@@ -83,8 +83,8 @@ def _scenarios_in_full(entries: Entries, console: Console) -> None:
         _head(console, entry["name"], entry["text"])
         beside = "" if entry["thesis"] is None else f"; the thesis' {entry['thesis']}"
         _line(console, f"{entry['environment']}{_in_engines(entry)}{beside}")
-        _line(console, f"arguments: {json.dumps(entry['arguments'])}")
-        _line(console, f"disturbances: {json.dumps(entry['disturbances'])}")
+        _line(console, f"arguments: {_json(entry['arguments'])}")
+        _line(console, f"disturbances: {_json(entry['disturbances'])}")
 
 
 def _controllers_in_full(entries: Entries, console: Console) -> None:
@@ -156,7 +156,8 @@ def _summary(found: dict[str, Entries], console: Console) -> None:
     frontiers: dict[str, list[str]] = {}
     for environment, varied in _grouped(found["frontiers"], "environment").items():
         frontiers.setdefault(", ".join(varied), []).append(environment)
-    _names(console, "Frontiers", {", ".join(places): [varied] for varied, places in frontiers.items()})
+    of_environments = {", ".join(places): [varied] for varied, places in frontiers.items()}
+    _names(console, "Frontiers: parameters of `frontier --vary`", of_environments)
     console.print()
     console.print(f"For details: `artde-gym list` with one of {', '.join(TOPICS)}.")
 
@@ -183,6 +184,11 @@ def _grouped(entries: Entries, key: str) -> dict[str, list[str]]:
     for entry in entries:
         groups.setdefault(entry[key], []).append(entry["name"])
     return groups
+
+
+def _json(value: Any) -> str:
+    """Write a value as JSON, without the last digits that products of numbers leave (1.0499999999999998)."""
+    return json.dumps(json.loads(json.dumps(value), parse_float=lambda number: float(f"{float(number):.12g}")))
 
 
 def _head(console: Console, name: str, text: str) -> None:

@@ -228,7 +228,7 @@ class Chart:
 
     def file(self) -> str:
         """Return the chart as a standalone SVG file, in the colors of the reports."""
-        style = "".join((_ASSETS / name).read_text(encoding="utf-8") for name in ("style.css", "chart.css"))
+        style = "".join((_ASSETS / name).read_text(encoding="utf-8") for name in ("chart.css", "style.css"))
         size = f'xmlns="http://www.w3.org/2000/svg" width="{2 * self.width}" height="{2 * self.height}"'
         whole = self.svg().replace("<svg ", f"<svg {size} ", 1)
         return whole.replace("</title>", f"</title><style><![CDATA[{style}]]></style>", 1)

@@ -71,7 +71,7 @@ def _judged(actuator: ActuatorInertia) -> CheckResult:
     (loop,) = loops(actuator_inertia=actuator)
     without = {"tuned"} if actuator == STIFF_ACTUATORS else {"tuned", "stiff"}
     valid, found = judged(preset_designs(loop, DRIVE, lambda preset: preset not in without))
-    what = f"biped, actuators {actuator!r}"
+    what = f"biped, actuators {actuator!r}" + (", presets 'stiff' too" if "stiff" not in without else "")
     if actuator == INVALID and not valid:
         return CheckResult(what, "ok", f"{found}: outside, as its documentation says")
     return CheckResult(what, "ok", found) if valid else CheckResult(what, "failed", found, REMEDY)

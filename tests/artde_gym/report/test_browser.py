@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from artde_gym.palette import STYLES
+from artde_gym.report.chart import Axis, Chart
+
 pytestmark = pytest.mark.browser
 
 PHONE = 375  # pixels
@@ -50,6 +53,18 @@ def test_a_controllers_colour_is_lifted_in_the_dark_and_exact_in_the_light(brows
     light = browser.run(color)
     assert light == "rgb(0, 114, 178)"  # of TDE
     browser.open(walks / "report.html", dark=True)
+    assert browser.run(color) != light
+
+
+def test_a_figure_in_a_file_has_the_reports_colors(browser, tmp_path):
+    chart = Chart("A line", Axis("x", 0.0, 1.0), Axis("y", 0.0, 1.0))
+    chart.line([0.0, 1.0], [0.0, 1.0], STYLES["tde"])
+    (tmp_path / "figure.svg").write_text(chart.file(), encoding="utf-8")
+    color = "getComputedStyle(document.querySelector('.line')).stroke"
+    browser.open(tmp_path / "figure.svg")
+    light = browser.run(color)
+    assert light == "rgb(0, 114, 178)"
+    browser.open(tmp_path / "figure.svg", dark=True)
     assert browser.run(color) != light
 
 
