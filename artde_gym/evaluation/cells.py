@@ -77,8 +77,9 @@ def engines_of(cells: Iterable[Cell]) -> dict[str, str]:
     """Return the engines of some cells, with what chose each one: "asked for", "default", or both."""
     chosen: dict[str, set[str]] = {}
     for cell in cells:
-        chosen.setdefault(cell.kwargs.get("engine"), set()).add("asked for" if cell.engine_asked else "default")
-    return {name: " and ".join(sorted(how)) for name, how in chosen.items() if name is not None}
+        if (name := cell.kwargs.get("engine")) is not None:
+            chosen.setdefault(name, set()).add("asked for" if cell.engine_asked else "default")
+    return {name: " and ".join(sorted(how)) for name, how in chosen.items()}
 
 
 def _scenarios(env_id: str | None, names: str | Sequence[str]) -> list[Scenario]:
