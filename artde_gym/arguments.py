@@ -14,7 +14,14 @@ from typing import Any, Concatenate, Literal, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from artde_gym.errors import ActionError, ArtdeGymError, OptionError, UnknownArgumentError, suggest_names
+from artde_gym.errors import (
+    ActionError,
+    ArtdeGymError,
+    MissingDependencyError,
+    OptionError,
+    UnknownArgumentError,
+    suggest_names,
+)
 
 Owner = TypeVar("Owner")
 Arguments = ParamSpec("Arguments")
@@ -191,7 +198,7 @@ def wrap_read_errors(field: str, path: Path, allowed: str, kind: type[ArtdeGymEr
     """
     try:
         yield
-    except kind:
+    except (kind, MissingDependencyError):  # a missing package is no fault of the file
         raise
     except Exception as error:
         problem = f"cannot be read ({type(error).__name__}: {error})"

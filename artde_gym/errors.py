@@ -62,8 +62,11 @@ class UnknownArgumentError(OptionError, TypeError):
         return f"{self.field} got an unexpected keyword argument {self.shown}; allowed: {self.allowed}"
 
 
-class MissingDependencyError(OptionError):
-    """An argument that needs a package that is not installed; `allowed` says what to do."""
+class MissingDependencyError(OptionError, ModuleNotFoundError):
+    """Something that needs a package that is not installed; `allowed` says what to do.
+
+    Also a `ModuleNotFoundError`, since modules raise it when they are imported without their package.
+    """
 
     def __str__(self) -> str:
         return f"{self.field} {self.shown} is not available: {self.allowed}"

@@ -5,21 +5,40 @@ from __future__ import annotations
 import contextlib
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from artde_gym.errors import OptionError, StoreError
 
 
+@contextlib.contextmanager
+def making_folder(folder: Path) -> Iterator[None]:
+    """Report what keeps a results folder from being made, or written to.
+
+    Raises:
+        StoreError: if it cannot be made or written to.
+    """
+    remedy = "choose another one with --out (out=)"
+    try:
+        yield
+    except (FileExistsError, NotADirectoryError):
+        raise StoreError("output folder", str(folder), remedy, "is a file, or lies in one") from None
+    except OSError as error:
+        raise StoreError("output folder", str(folder), remedy, f"is not writable ({error})") from error
+
+
 def check_replaceable(path: Path) -> None:
     """See that a file may take the place of what is there: a device such as /dev/null would be lost to everybody.
 
     Raises:
-        StoreError: if it is anything but a file.
+        StoreError: if it is anything but a file, or its folder, or the one in which that would be made, is read-only.
     """
     if path.exists() and not path.is_file():
         raise StoreError("output file", str(path), "choose another name", "is not a file that could be replaced")
+    there = next((folder for folder in path.parents if folder.exists()), None)
+    if there is None or not os.access(there, os.W_OK | os.X_OK):
+        raise StoreError("output file", str(path), "choose another place", "is in a folder that is not writable")
 
 
 def check_figure(field: str, path: Path) -> None:

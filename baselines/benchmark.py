@@ -13,6 +13,7 @@ import gymnasium as gym
 from artde_gym.arrays import Array
 from artde_gym.benchmark.figure import Figure, Section
 from artde_gym.benchmark.timing import Job, in_turns
+from artde_gym.errors import MissingDependencyError
 from baselines.agent import AGENTS
 from baselines.policy_file import DESCRIPTION, read
 from baselines.residual_config import ResidualConfig
@@ -91,8 +92,8 @@ def training(quick: bool) -> Section:
     try:
         tasks = [env_id for agent in AGENTS.values() for env_id in agent.tasks]
         figures = [figure for env_id in tasks for figure in _throughput(env_id, 1 if quick else ROLLOUTS)]
-    except ModuleNotFoundError as error:
-        return Section(title, text, skipped=f"{error.name} is missing: pip install 'artde-gym[rl,mujoco]'")
+    except MissingDependencyError as error:
+        return Section(title, text, skipped=str(error))
     return Section(title, text, tuple(figures))
 
 

@@ -14,10 +14,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 
 from artde_gym.arguments import wrap_read_errors
+from artde_gym.extras import needs
 from baselines.errors import TrainingError
+
+with needs("rl"):
+    import torch
 
 KEPT = 2
 

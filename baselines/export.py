@@ -5,9 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from torch import nn
 
+from artde_gym.extras import needs
 from baselines.network import Network
+
+with needs("rl"):
+    from torch import nn
 
 
 def exported(model: Any, normalizer: Any) -> Network:

@@ -6,9 +6,13 @@ from collections.abc import Callable, Generator
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from stable_baselines3.common.buffers import RolloutBuffer
+
+from artde_gym.extras import needs
+
+with needs("rl"):
+    import torch
+    from stable_baselines3.common.buffers import RolloutBuffer
 
 OPEN = 0.05  # of the gate; a shut one would be 0, were the normalizer not still moving
 KEPT = 5  # one in so many of the others is learned from, for the values there

@@ -10,17 +10,12 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from stable_baselines3 import PPO, SAC
-from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.logger import Logger, configure
-from stable_baselines3.common.utils import set_random_seed
-from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv, VecMonitor, VecNormalize
 
 from artde_gym.errors import WorkerError
 from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.workers import FEWER, GUARD, ignored_interrupt
+from artde_gym.extras import needs
 from artde_gym.layout import Layout
 from baselines.checkpoint import Checkpoints
 from baselines.errors import TrainingError
@@ -31,6 +26,15 @@ from baselines.residual_env import ResidualEnv
 from baselines.rollouts import OpenRollouts
 from baselines.run import Progress, Run, Training, environment_kwargs, single
 from baselines.vec_env import batched
+
+with needs("rl"):
+    import tensorboard  # noqa: F401  # Stable-Baselines3 imports it only once a training has begun
+    import torch
+    from stable_baselines3 import PPO, SAC
+    from stable_baselines3.common.callbacks import BaseCallback
+    from stable_baselines3.common.logger import Logger, configure
+    from stable_baselines3.common.utils import set_random_seed
+    from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv, VecMonitor, VecNormalize
 
 HIDDEN = (64, 64)
 CRITIC = (256, 256)  # of SAC

@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from cmaes import CMA
 from numpy.typing import NDArray
 
 from artde_gym.arguments import wrap_read_errors
 from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.store import write_atomically
+from artde_gym.extras import needs
 from baselines.agent import agent_of
 from baselines.balance import GAINS, balance_network
 from baselines.errors import TrainingError
@@ -25,6 +25,9 @@ from baselines.network import Network
 from baselines.ojas_tasks import push
 from baselines.run import Progress, Run, Training, environment_kwargs
 from baselines.vec_env import ResidualVecEnv, batched
+
+with needs("rl"):
+    from cmaes import CMA
 
 POPULATION = 14
 PUSHES = 16  # episodes of each candidate

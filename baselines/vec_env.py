@@ -8,10 +8,10 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
-from stable_baselines3.common.vec_env import VecEnv
 
 from artde_gym.arguments import real_array
 from artde_gym.errors import ActionError, OptionError
+from artde_gym.extras import needs
 from baselines.action_adapter import total
 from baselines.residual import Residual, ResidualState
 from baselines.residual_config import ResidualConfig
@@ -19,6 +19,9 @@ from baselines.residual_env import action_space, agent_space
 from baselines.tasks import task
 from controllers.laws.tracking import Array
 from controllers.policies import choose
+
+with needs("rl"):
+    from stable_baselines3.common.vec_env import VecEnv
 
 Float = NDArray[np.float32]
 

@@ -5,9 +5,11 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import release_links
 from packaging.requirements import Requirement
 
 ROOT = Path(__file__).parents[1]
+PACKAGES = ["artde_gym", "baselines", "controllers"]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
 
@@ -48,7 +50,34 @@ def test_every_dependency_has_a_lower_bound_and_constraints_allow_it():
             assert one.specifier.contains(version), (one, version)
 
 
-@pytest.mark.parametrize("package", ["artde_gym", "baselines", "controllers"])
+def test_licenses_of_everything_that_is_bundled_are_the_distributions_own():
+    bundled = [path for package in PACKAGES for path in (ROOT / package).rglob("*") if "license" in path.name.lower()]
+    found = {path.relative_to(ROOT).as_posix() for path in bundled}
+    assert found
+    assert {"LICENSE", *found} == set(PROJECT["license-files"])
+    assert all((ROOT / name).is_file() for name in PROJECT["license-files"])
+
+
+def test_a_released_readme_leads_to_the_repository():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    base = "https://host.example/owner/repository"
+    released = release_links.absolute(text, base, "v1.2.3")
+    links = re.findall(r"(!?)\[[^\]]*\]\(([^)]+)\)", released)
+    assert len(links) >= 10
+    for picture, target in links:
+        found = re.fullmatch(rf"{base}/(raw|tree|blob)/v1\.2\.3/(.+)", target)
+        assert found is not None, target
+        path = ROOT / found[2]
+        assert found[1] == ("raw" if picture else "tree" if path.is_dir() else "blob")
+        assert path.exists(), target
+    assert release_links.absolute(released, base, "v1.2.3") == released
+    project = release_links.with_urls((ROOT / "pyproject.toml").read_text(encoding="utf-8"), base, "v1.2.3")
+    urls = tomllib.loads(project)["project"].pop("urls")
+    assert urls["Repository"] == base
+    assert {**PROJECT, "urls": urls} == tomllib.loads(project)["project"]
+
+
+@pytest.mark.parametrize("package", PACKAGES)
 def test_packages_are_typed(package):
     file = importlib.import_module(package).__file__
     assert file

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 import warnings
@@ -28,7 +29,7 @@ from artde_gym.cli import (
     tune,
     video,
 )
-from artde_gym.errors import ArtdeGymError
+from artde_gym.errors import ArtdeGymError, StoreError
 from controllers import GainError
 
 app = typer.Typer(
@@ -56,12 +57,34 @@ app.command()(design.design)
 
 def main() -> None:
     """Run the command; user errors are reported in one line on standard error with exit code 2."""
+    _print_any_text()
     _tell_warnings()
     try:
+        _check_current_folder()
         app()
     except (ArtdeGymError, GainError, gym.error.Error, OSError) as error:  # OSError: a full disk, for example
         typer.echo(f"artde-gym: {error}", err=True)
         sys.exit(2)
+
+
+def _print_any_text() -> None:
+    """Let characters that the terminal, or a pipe, cannot encode appear as escapes: names of files may have any."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _check_current_folder() -> None:
+    """See that the current folder exists: workers, which begin there, would fail in many ways.
+
+    Raises:
+        StoreError: if it does not.
+    """
+    try:
+        os.getcwd()
+    except OSError as error:
+        folder = os.environ.get("PWD", os.curdir)
+        raise StoreError("current folder", folder, "change to another one", "does not exist anymore") from error
 
 
 def _tell_warnings() -> None:

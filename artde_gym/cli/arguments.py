@@ -15,6 +15,7 @@ import typer
 
 from artde_gym.arguments import wrap_read_errors
 from artde_gym.errors import OptionError
+from artde_gym.files import making_folder
 from artde_gym.sim.factory import ENGINES
 
 WALK = "BipedWalk-Payload-v0"
@@ -158,14 +159,20 @@ def processes(workers: int | None) -> int:
 
 
 def folder_of(out: Path | None) -> Path:
-    """Return the given results folder, or create a new one, named by the time, for this process alone."""
+    """Return the given results folder, or create a new one, named by the time, for this process alone.
+
+    Raises:
+        StoreError: if none can be created here.
+    """
     if out is not None:
         return out
     second = Path("runs") / datetime.datetime.now().strftime("%Y-%m-%d-%H%M%S")
     folder, number = second, 1
-    while not _made(folder):
-        number += 1
-        folder = second.with_name(f"{second.name}-{number}")
+    with making_folder(second):
+        second.parent.mkdir(exist_ok=True)
+        while not _made(folder):
+            number += 1
+            folder = second.with_name(f"{second.name}-{number}")
     atexit.register(_remove_if_empty, folder.absolute())
     return folder
 
@@ -173,7 +180,7 @@ def folder_of(out: Path | None) -> Path:
 def _made(folder: Path) -> bool:
     """Make a folder; return False if it exists."""
     try:
-        folder.mkdir(parents=True)
+        folder.mkdir()
     except FileExistsError:
         return False
     return True

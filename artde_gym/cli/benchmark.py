@@ -14,7 +14,7 @@ from artde_gym.benchmark import SECTIONS, Section, measure
 from artde_gym.cli.arguments import names
 from artde_gym.cli.display import terminal
 from artde_gym.evaluation.fitting_table import FittingTable
-from artde_gym.files import write_atomically
+from artde_gym.files import check_replaceable, write_atomically
 
 
 def benchmark(
@@ -30,6 +30,8 @@ def benchmark(
     """Measure speed and memory, as ratios; takes some minutes."""
     from artde_gym.benchmark.page import page, record  # heavy: only when the command runs
 
+    for file in filter(None, (json_file, page_file)):
+        check_replaceable(file)
     console = terminal()
     with console.status("") as status:
         found = measure(

@@ -26,7 +26,7 @@ from artde_gym.cli.arguments import (
     names,
 )
 from artde_gym.cli.display import terminal
-from artde_gym.errors import MissingDependencyError, OptionError
+from artde_gym.errors import OptionError
 
 if TYPE_CHECKING:
     from artde_gym.play.server import Server
@@ -53,13 +53,10 @@ def play(
 
     Also drop its payload, change gains, compare two controllers, and save what you did for `evaluate`.
     """
-    try:
-        from artde_gym.play.server import Server  # only when asked for
-    except ModuleNotFoundError as error:
-        raise MissingDependencyError("package", "websockets", "pip install 'artde-gym[play]'") from error
-    from artde_gym.evaluation.plan import Plan
+    from artde_gym.evaluation.plan import Plan  # only when asked for
     from artde_gym.play.game import Game
     from artde_gym.play.loop import run
+    from artde_gym.play.server import Server
 
     if port is not None and not 0 <= port <= 65535:
         raise OptionError("--port", port, "0 to 65535")

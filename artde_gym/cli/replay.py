@@ -19,6 +19,7 @@ from artde_gym.cli.arguments import (
 )
 from artde_gym.cli.display import passing_bar, terminal
 from artde_gym.errors import OptionError
+from artde_gym.files import check_replaceable
 
 
 def replay(
@@ -50,6 +51,7 @@ def replay(
     from artde_gym.evaluation.replay import replay as run_replay  # only when asked for
     from artde_gym.evaluation.replay import replay_folder
 
+    check_replaceable(out)
     console = terminal()
     with passing_bar(console) as bar:
         shown = bar.add_task("")

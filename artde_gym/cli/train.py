@@ -21,7 +21,7 @@ from artde_gym.cli.arguments import (
 )
 from artde_gym.cli.display import terminal, words
 from artde_gym.cli.report import show_report
-from artde_gym.errors import MissingDependencyError, OptionError
+from artde_gym.errors import OptionError
 
 
 def train(
@@ -112,13 +112,8 @@ def train(
 
 def _trainer(algo: str) -> Callable[..., Path]:
     """Return the training function of an algorithm; torch is heavy and may not be installed."""
-    try:
-        if algo == "cma-es":
-            from baselines.tune_balance import tune as go
-        else:
-            from baselines.train import train as go
-    except ModuleNotFoundError as error:
-        if error.name not in ("cmaes", "stable_baselines3", "torch", "tensorboard"):
-            raise
-        raise MissingDependencyError("algo", algo, f"it needs {error.name}; pip install 'artde-gym[rl]'") from error
+    if algo == "cma-es":
+        from baselines.tune_balance import tune as go
+    else:
+        from baselines.train import train as go
     return go

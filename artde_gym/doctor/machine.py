@@ -17,7 +17,7 @@ from artde_gym.doctor.check_result import CheckResult, Status
 from artde_gym.sim.factory import missing_bullet
 
 PACKAGE = "artde-gym"
-MODULES = {"mujoco": "mujoco", "numpy": "numpy", "scipy": "scipy", "pandas": "pandas"}
+MODULES = {"mujoco": "artde_gym.sim.mujoco_module", "numpy": "numpy", "scipy": "scipy", "pandas": "pandas"}
 """Packages with compiled parts -> modules whose import proves that they load."""
 FREE_DISK_BYTES = 1e9  # bytes, enough for most results folders
 RUNS = Path("runs")
@@ -45,7 +45,7 @@ def python() -> list[CheckResult]:
             importlib.import_module(module)
         except Exception as error:
             again = f"pip install --force-reinstall --no-deps {name}"
-            outcomes.append(CheckResult(f"import {module}", "failed", f"{type(error).__name__}: {error}", again))
+            outcomes.append(CheckResult(f"import {name}", "failed", f"{type(error).__name__}: {error}", again))
     return [*outcomes, _engine()]
 
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
 import shutil
 import subprocess
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -13,6 +12,7 @@ import gymnasium as gym
 from artde_gym.doctor.check_result import CheckResult
 from artde_gym.errors import MissingDependencyError, OptionError
 from artde_gym.sim.factory import ENGINES
+from artde_gym.video.writer import ffmpeg
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
@@ -35,23 +35,17 @@ def _picture(engine: str, written: str) -> CheckResult:
     except MissingDependencyError as error:
         return CheckResult(what, "missing", f"no {written}", error.allowed)
     except OptionError as error:
-        return CheckResult(what, "missing", "no OpenGL without a display", str(error.allowed))
+        return CheckResult(what, "missing", str(error).partition("; ")[0], error.allowed)
     height, width, _ = picture.shape
     return CheckResult(what, "ok", f"{width} x {height}, without a display")
 
 
 def _ffmpeg() -> CheckResult:
-    """Check for ffmpeg: the system's, or the one that comes with MoviePy."""
-    path = shutil.which("ffmpeg")
-    if path is None and importlib.util.find_spec("imageio_ffmpeg") is not None:
-        try:
-            path = importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe()
-        except RuntimeError:
-            path = None
-    if path is None:
-        return CheckResult(
-            "ffmpeg", "missing", "not found: no .mp4", "pip install 'artde-gym[video]', or apt install ffmpeg"
-        )
+    """Check for ffmpeg as videos find it: the system's, or the one that comes with imageio-ffmpeg."""
+    try:
+        path = ffmpeg(Path("video.mp4")).get_ffmpeg_exe()
+    except OptionError as error:
+        return CheckResult("ffmpeg", "missing", "not found: no .mp4", error.allowed)
     said = subprocess.run([path, "-version"], capture_output=True, text=True, timeout=20, check=False).stdout
     return CheckResult("ffmpeg", "ok", " ".join(said.split()[:3]))
 

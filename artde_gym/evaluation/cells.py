@@ -18,12 +18,16 @@ DEFAULT_ENVIRONMENT = "BipedWalk-Payload-v0"
 
 
 class Cell(NamedTuple):
-    """One scenario to run, as plain data that can be sent to a worker."""
+    """One scenario to run, as plain data that can be sent to a worker.
+
+    `engine_asked` tells whether its engine was asked for; else it is the default of this machine.
+    """
 
     name: str
     env_id: str
     kwargs: dict[str, Any]
     phases: tuple[Span, ...] = ()
+    engine_asked: bool = False
 
 
 def cells_of(
@@ -51,13 +55,29 @@ def cells_of(
     if names is None:
         own = {} if disturbances is None else {"disturbances": disturbances}
         env_id = DEFAULT_ENVIRONMENT if env_id is None else env_id
-        return [Cell(CUSTOM, env_id, {**with_engine(env_id, kwargs, vectorized), **own})]
+        arguments = {**with_engine(env_id, kwargs, vectorized), **own}
+        return [Cell(CUSTOM, env_id, arguments, engine_asked=_asked(kwargs))]
     cells = []
     for entry in _scenarios(env_id, names):
         chosen = dict(entry.disturbances if disturbances is None else disturbances)
-        arguments = with_engine(entry.env_id, {**entry.kwargs, **kwargs}, vectorized)
-        cells.append(Cell(entry.name, entry.env_id, {**arguments, "disturbances": chosen}, entry.phases))
+        given = {**entry.kwargs, **kwargs}
+        arguments = {**with_engine(entry.env_id, given, vectorized), "disturbances": chosen}
+        cells.append(Cell(entry.name, entry.env_id, arguments, entry.phases, _asked(given)))
     return cells
+
+
+def _asked(kwargs: Mapping[str, Any]) -> bool:
+    """Tell whether an engine was asked for."""
+    return kwargs.get("engine") is not None
+
+
+def engines_of(cells: Iterable[Cell]) -> dict[str, str]:
+    """Return the engines of some cells, with what chose each one: "asked for", "default", or both."""
+    chosen: dict[str, set[str]] = {}
+    for cell in cells:
+        if (name := cell.kwargs.get("engine")) is not None:
+            chosen.setdefault(name, set()).add("asked for" if cell.engine_asked else "default")
+    return {name: " and ".join(sorted(how)) for name, how in chosen.items()}
 
 
 def _scenarios(env_id: str | None, names: str | Sequence[str]) -> list[Scenario]:

@@ -25,6 +25,7 @@ from filelock import FileLock, Timeout
 from artde_gym.errors import StoreError
 from artde_gym.evaluation.provenance import command
 from artde_gym.evaluation.workers import end_unguarded
+from artde_gym.files import making_folder
 
 LOCK, HOLDER = ".lock", ".lock.json"
 NEW_OR_EMPTY = "choose a new or empty folder"
@@ -83,18 +84,15 @@ def is_empty(folder: Path) -> bool:
 
 def _acquire(folder: Path) -> tuple[list[Path], FileLock]:
     """Return the created folders and the held lock."""
-    try:
+    with making_folder(folder):
         made = _make(folder)
         lock = FileLock(folder / LOCK, blocking=False, thread_local=False, is_singleton=False)
-        lock.acquire()
+        try:
+            lock.acquire()
+        except Timeout:
+            problem = f"is in use by {_holder(folder)}"
+            raise StoreError("output folder", str(folder), "choose a folder without another writer", problem) from None
         _sign(folder)
-    except Timeout:
-        problem = f"is in use by {_holder(folder)}"
-        raise StoreError("output folder", str(folder), "choose a folder without another writer", problem) from None
-    except (FileExistsError, NotADirectoryError):
-        raise StoreError("output folder", str(folder), NEW_OR_EMPTY, "contains other files") from None
-    except OSError as error:
-        raise StoreError("output folder", str(folder), "choose another one", f"is not writable ({error})") from error
     return made, lock
 
 

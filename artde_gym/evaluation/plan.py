@@ -14,7 +14,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 from artde_gym.arguments import check_bool, check_integer, check_number
-from artde_gym.evaluation.cells import Cell, cells_of, validate_cell
+from artde_gym.evaluation.cells import Cell, cells_of, engines_of, validate_cell
 from artde_gym.evaluation.gains import checked_gains, policy_for
 from artde_gym.evaluation.identity import Identity, behind, identity_of
 from artde_gym.evaluation.labels import named_controllers
@@ -135,7 +135,8 @@ class Plan:
 
     def provenance(self, evidence: Mapping[str, str]) -> dict[str, Any]:
         """Return the provenance of the results, including the hashes from `try_out`."""
-        return provenance(evidence, {name: identity.by for name, identity in self._identities.items()})
+        identified_by = {name: identity.by for name, identity in self._identities.items()}
+        return provenance(evidence, identified_by, engines_of(self.cells))
 
     @functools.cached_property
     def _identities(self) -> dict[str, Identity]:

@@ -31,13 +31,16 @@ MIXED = "mixed_with"
 
 
 def provenance(
-    behind: Mapping[str, str] | None = None, identified_by: Mapping[str, str] | None = None
+    behind: Mapping[str, str] | None = None,
+    identified_by: Mapping[str, str] | None = None,
+    engines: Mapping[str, str] | None = None,
 ) -> dict[str, Any]:
     """Return everything needed to reproduce a run.
 
     Args:
         behind: hashes of the controllers' weights and code, see `artde_gym.evaluation.identity.behind`.
         identified_by: controller -> the method that determined its identity.
+        engines: physics engine -> whether it was asked for, see `artde_gym.evaluation.cells.engines_of`.
     """
     return {
         "time": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
@@ -49,6 +52,7 @@ def provenance(
         "packages": versions(PACKAGES),
         "behind_controllers": dict(behind or {}),
         "identified_by": dict(identified_by or {}),
+        "engines": dict(engines or {}),
     }
 
 
@@ -94,8 +98,12 @@ def _differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> dict[str,
 
 
 def command() -> str:
-    """Return the command line of this process."""
-    return " ".join([Path(sys.argv[0]).name, *sys.argv[1:]])
+    """Return the command line of this process, as text that any file can hold.
+
+    In a locale that is not UTF-8's, Python keeps the bytes of other characters as lone surrogates.
+    """
+    words = " ".join([Path(sys.argv[0]).name, *sys.argv[1:]])
+    return words.encode("utf-8", sys.getfilesystemencodeerrors()).decode("utf-8", "backslashreplace")
 
 
 @functools.cache  # an imported module stays what it was, whatever happens to its file

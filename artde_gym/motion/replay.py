@@ -8,6 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from artde_gym.files import check_replaceable, write_atomically
 from artde_gym.motion.page import page
 
 HEIGHT = 900  # pixels, of the frame in a notebook
@@ -43,8 +44,9 @@ class Replay:
                 it; None to put it into the page.
         """
         out = Path(out)
+        check_replaceable(out)
         out.parent.mkdir(parents=True, exist_ok=True)
-        out.write_text(page(self._title, self.figures, viewer), encoding="utf-8")
+        write_atomically(out, lambda file: file.write(page(self._title, self.figures, viewer).encode()))
         return out
 
     def _repr_html_(self) -> str:

@@ -19,13 +19,15 @@ from http import HTTPStatus
 from typing import Any, NamedTuple
 from urllib.parse import parse_qs, urlsplit
 
-from websockets.datastructures import Headers
-from websockets.exceptions import ConnectionClosed
-from websockets.http11 import Request, Response
-from websockets.sync.server import ServerConnection, serve
-
 from artde_gym.errors import OptionError
+from artde_gym.extras import needs
 from artde_gym.play.page import live_page, policy_of
+
+with needs("play"):
+    from websockets.datastructures import Headers
+    from websockets.exceptions import ConnectionClosed
+    from websockets.http11 import Request, Response
+    from websockets.sync.server import ServerConnection, serve
 
 LOOPBACK = "127.0.0.1"
 PORT = 8765  # where it is free

@@ -213,6 +213,8 @@ def _origin(record: Mapping[str, Any]) -> str:
         "Python": f"{origin['python']} on {origin['platform']}",
         "packages": _packages(origin),
     }
+    if origin.get("engines"):
+        facts["engines"] = ", ".join(f"{name}: {how}" for name, how in origin["engines"].items())
     for i, other in enumerate(origin.get(MIXED, []), start=1):
         facts[f"mixed with results of other software ({i})"] = f"commit {other['commit']}: {_packages(other)}"
     return _facts(facts, record["configuration"])

@@ -18,7 +18,6 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
-import pybullet_data
 from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
@@ -30,7 +29,7 @@ from artde_gym.sim.bullet_payload import MASSLESS, Carried, Fall
 from artde_gym.sim.camera import FIELD_OF_VIEW, NEAR, Camera
 from artde_gym.sim.engine import AT_ORIGIN, PAYLOAD_COLOR, PAYLOAD_LOOK, PAYLOAD_RADIUS, State
 from artde_gym.sim.ground import SUN, Shadow, paint
-from artde_gym.sim.pybullet_module import bullet
+from artde_gym.sim.pybullet_module import bullet, bullet_data
 from artde_gym.sim.rotation import Quaternion, point_velocity, rotate
 
 GEAR_ITERATIONS = 60  # of the solver; with 30, the gears' residual raises ARTDE's RMSE in S1 by a third
@@ -82,7 +81,7 @@ class BulletEngine:
         self._robot = self._build_robot()
         self._ball = bullet.createVisualShape(  # shape of the payload, made once: Bullet never frees a visual shape
             bullet.GEOM_MESH,
-            fileName=str(Path(pybullet_data.getDataPath()) / "sphere_smooth.obj"),  # of radius 1
+            fileName=str(Path(bullet_data.getDataPath()) / "sphere_smooth.obj"),  # of radius 1
             meshScale=[PAYLOAD_LOOK] * 3,
             rgbaColor=PAYLOAD_COLOR,
             physicsClientId=self._client,
@@ -103,7 +102,7 @@ class BulletEngine:
 
     def _build_ground(self) -> int:
         shape = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=self._client)
-        mesh = str(Path(pybullet_data.getDataPath()) / "plane100.obj")
+        mesh = str(Path(bullet_data.getDataPath()) / "plane100.obj")
         visual = bullet.createVisualShape(bullet.GEOM_MESH, fileName=mesh, physicsClientId=self._client)
         ground = bullet.createMultiBody(0.0, shape, visual, physicsClientId=self._client)
         bullet.changeDynamics(ground, -1, lateralFriction=1.0, restitution=0.0, physicsClientId=self._client)

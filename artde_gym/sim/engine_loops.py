@@ -107,6 +107,6 @@ def _bullet(engine: Any) -> tuple[Any, Any, Any, Any]:
 
 
 def _mujoco(engine: Any) -> tuple[Any, Any, Any, Any]:
-    import mujoco
+    from artde_gym.sim.mujoco_module import mj  # only when asked for
 
-    return mujoco, engine._model, engine._data, engine._joints
+    return mj, engine._model, engine._data, engine._joints

@@ -136,8 +136,8 @@ def missing_bullet() -> str:
     """Return why PyBullet is unavailable and a remedy; an empty string if it is available."""
     try:
         importlib.import_module("artde_gym.sim.pybullet_module")
-    except ImportError as error:
-        return why_no_bullet(error)
+    except MissingDependencyError as error:
+        return error.allowed
     return ""
 
 

@@ -9,13 +9,11 @@ import math
 import xml.etree.ElementTree as ET
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from artde_gym.errors import RobotError
 from artde_gym.multibody.model_file import FileJoint, FileLink, ModelTree, check_links, check_name
-
-mj: Any = mujoco  # compiled, without type information
+from artde_gym.sim.mujoco_module import mj
 
 REFUSED = ("attach", "composite", "extension", "flex", "flexcomp", "include", "model", "plugin", "replicate", "skin")
 """Elements that read other files, load code or multiply bodies."""

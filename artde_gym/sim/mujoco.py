@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,10 +21,9 @@ from artde_gym.sim.camera import Camera
 from artde_gym.sim.engine import AT_ORIGIN, State
 from artde_gym.sim.ground import Shadow, paint
 from artde_gym.sim.mujoco_canvas import Canvas
+from artde_gym.sim.mujoco_module import mj
 from artde_gym.sim.mujoco_world import STATE, Blueprint, Fields, MujocoWorld
 from artde_gym.sim.rotation import Quaternion, point_velocity, rotate
-
-mj: Any = mujoco  # compiled, without type information
 
 
 class _Fall(NamedTuple):

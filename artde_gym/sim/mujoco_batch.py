@@ -8,19 +8,16 @@ from __future__ import annotations
 import functools
 from typing import Any, NamedTuple, TypeAlias
 
-import mujoco
 import numpy as np
-from mujoco.batch import Batch
 from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
 from artde_gym.errors import RobotError
 from artde_gym.multibody.spec import RobotSpec, Vector
 from artde_gym.sim.mujoco_kinematics import Kinematics
+from artde_gym.sim.mujoco_module import Batch, mj
 from artde_gym.sim.mujoco_world import FIELDS, Blueprint, Fields, MujocoWorld
 from artde_gym.sim.rotation import rotate
-
-mj: Any = mujoco  # compiled, without type information
 
 Ids = NDArray[np.int32]
 """Indices of worlds, sorted and unique."""

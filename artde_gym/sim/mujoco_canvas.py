@@ -1,33 +1,22 @@
-"""Offscreen rendering of a MuJoCo world with OpenGL, through EGL or else OSMesa.
-
-The environment variable MUJOCO_GL ("egl", "osmesa") selects one, as usual in MuJoCo.
-"""
+"""Offscreen rendering of a MuJoCo world with OpenGL."""
 
 from __future__ import annotations
 
 import atexit
-import ctypes
-import importlib
-import os
-import sys
 import weakref
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
-from artde_gym.errors import OptionError
 from artde_gym.multibody.mjcf import mjcf
 from artde_gym.multibody.spec import RobotSpec, Vector
+from artde_gym.sim import opengl
 from artde_gym.sim.camera import Camera
 from artde_gym.sim.engine import PAYLOAD_COLOR, PAYLOAD_LOOK
+from artde_gym.sim.mujoco_module import mj
 
-mj: Any = mujoco  # compiled, without type information
-
-_LIBRARIES = {"egl": "libEGL.so.1", "osmesa": "libOSMesa.so.8"}
-_INSTALL = "install EGL or OSMesa (Debian: apt install libegl1 libgl1-mesa-dri, or libosmesa6), or use engine 'bullet'"
 _MAX_SHAPES = 1000  # most shapes in a scene
 
 
@@ -41,7 +30,7 @@ class Canvas:
     def __init__(self, spec: RobotSpec) -> None:
         self._model = model = mj.MjModel.from_xml_string(mjcf(spec))
         self._data = mj.MjData(model)
-        self._context = context = _context()
+        self._context = context = opengl.context()
         context.make_current()
         self._painter = mj.MjrContext(model, mj.mjtFontScale.mjFONTSCALE_100)
         mj.mjr_setBuffer(mj.mjtFramebuffer.mjFB_OFFSCREEN, self._painter)
@@ -79,23 +68,6 @@ class Canvas:
         """Free the context; safe to call twice."""
         self._finalizer()
         atexit.unregister(self._finalizer)
-
-
-def _context() -> Any:
-    """Create an offscreen OpenGL context; on macOS and Windows, MuJoCo uses the system's."""
-    if sys.platform != "linux":
-        return importlib.import_module("mujoco.gl_context").GLContext(1, 1)
-    chosen = os.environ.get("MUJOCO_GL", "").lower()
-    for name in (chosen,) if chosen in _LIBRARIES else _LIBRARIES:
-        try:
-            ctypes.CDLL(_LIBRARIES[name])
-        except OSError:
-            continue
-        try:
-            return importlib.import_module(f"mujoco.{name}").GLContext(1, 1)  # any size: it draws into its own buffer
-        except (ImportError, AttributeError, RuntimeError) as error:
-            raise OptionError("render_mode", "rgb_array", _INSTALL, f"needs OpenGL ({name}: {error})") from error
-    raise OptionError("render_mode", "rgb_array", _INSTALL, "needs OpenGL, which is missing")
 
 
 def _free(context: Any, painter: Any) -> None:

@@ -6,16 +6,13 @@ A call of MuJoCo from Python takes longer than the kinematics of one robot.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from typing import Any
 
-import mujoco
 import numpy as np
 
 from artde_gym.arrays import Array
 from artde_gym.multibody.mjcf import mjcf
 from artde_gym.multibody.spec import RobotSpec
-
-mj: Any = mujoco  # compiled, without type information
+from artde_gym.sim.mujoco_module import mj
 
 COPIES = 16
 """Robots in a model: of more the call takes no less per robot, and compiling takes much longer."""

@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,8 +18,7 @@ from artde_gym.errors import RobotError
 from artde_gym.multibody.mjcf import CONTACT_TIME, PAYLOAD, mjcf
 from artde_gym.multibody.spec import RobotSpec, Vector
 from artde_gym.sim.engine import PAYLOAD_RADIUS
-
-mj: Any = mujoco  # compiled, without type information
+from artde_gym.sim.mujoco_module import mj
 
 STATE = mj.mjtState.mjSTATE_INTEGRATION  # everything that the next step depends on
 FIELDS = ("body_mass", "body_inertia", "body_pos", "dof_armature", "pair_friction", "pair_solref", "opt.gravity")

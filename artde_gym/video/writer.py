@@ -14,6 +14,7 @@ from PIL import Image
 
 from artde_gym.arguments import check_number
 from artde_gym.errors import OptionError
+from artde_gym.extras import needs
 from artde_gym.files import check_replaceable
 
 Picture = NDArray[np.uint8]
@@ -45,7 +46,7 @@ def check(out: Path) -> None:
         raise OptionError("out", str(out), f"a file that ends in {', '.join(SUFFIXES)}")
     check_replaceable(out)
     if out.suffix in CODECS:
-        _ffmpeg(out)
+        ffmpeg(out)
 
 
 def frame_rate(out: Path, fps: float) -> float:
@@ -89,7 +90,7 @@ def write(out: Path, pictures: Iterator[Picture], fps: float) -> None:
 
 
 def _encode(out: Path, pictures: Iterator[Picture], fps: float) -> None:
-    library, first = _ffmpeg(out), next(pictures)
+    library, first = ffmpeg(out), next(pictures)
     height, width, _ = first.shape
     pipe = library.write_frames(
         str(out), (width, height), fps=fps, codec=None, quality=None, macro_block_size=2,
@@ -130,13 +131,17 @@ def _png(out: Path, pictures: Iterator[Picture], _fps: float) -> None:
     Image.fromarray(next(pictures)).save(out, optimize=True)
 
 
-def _ffmpeg(out: Path) -> Any:
-    """Import the library that provides ffmpeg."""
-    try:
-        import imageio_ffmpeg
+def ffmpeg(out: Path) -> Any:
+    """Import the library that provides ffmpeg.
 
+    Raises:
+        OptionError: if it is missing (MissingDependencyError), or has no ffmpeg.
+    """
+    others = ", or choose .gif, .webp or .png"
+    with needs("video", others):
+        import imageio_ffmpeg
+    try:
         imageio_ffmpeg.get_ffmpeg_exe()
-    except (ImportError, RuntimeError) as error:
-        todo = "pip install 'artde-gym[video]', or choose .gif, .webp or .png"
-        raise OptionError("out", str(out), todo, "needs ffmpeg") from error
+    except RuntimeError as error:  # a package without a binary, on a system without one
+        raise OptionError("out", str(out), f"install ffmpeg{others}", "needs ffmpeg, which is missing") from error
     return imageio_ffmpeg

@@ -359,8 +359,8 @@ def test_mujoco_refuses_rotors_that_are_links() -> None:
 def test_mujoco_says_what_it_needs_to_draw() -> None:
     """In a process of its own, where no library of OpenGL can be found."""
     script = (
-        "from artde_gym.sim import mujoco_canvas\n"
-        "mujoco_canvas._LIBRARIES = {'egl': 'libNone.so.1'}\n"
+        "from artde_gym.sim import opengl\n"
+        "opengl._LIBRARIES = {'egl': 'libNone.so.1'}\n"
         "import gymnasium, artde_gym\n"
         "kwargs = dict(duration=1.0, disable_env_checker=True, engine='mujoco')\n"
         "gymnasium.make('BipedWalk-Payload-v0', **kwargs)\n"

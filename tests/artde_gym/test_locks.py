@@ -132,7 +132,8 @@ def test_of_many_that_come_and_go_one_alone_holds_the_folder(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("where", "words"), [("file", "other files"), ("file/inside", "other files"), ("x" * 300, "name too long")]
+    ("where", "words"),
+    [("file", "is a file, or lies in one"), ("file/inside", "is a file, or lies in one"), ("x" * 300, "name too long")],
 )
 def test_a_folder_that_cannot_be_one_is_refused_in_words(tmp_path, where, words):
     (tmp_path / "file").write_text("dear")

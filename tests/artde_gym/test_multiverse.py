@@ -398,6 +398,10 @@ def test_without_scikit_learn_everything_else_works(monkeypatch, biped, tmp_path
     assert (biped.folder / "report.html").stat().st_size > 10_000
 
 
+def test_the_record_says_that_nobody_asked_for_the_engine(quadrotor):
+    assert quadrotor.provenance["engines"] == {"numpy": "default"}
+
+
 def test_rank_correlations_find_a_monotone_factor():
     rng = np.random.default_rng(1)
     factors = rng.uniform(size=(300, 2))

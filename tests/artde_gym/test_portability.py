@@ -152,6 +152,7 @@ def test_records_and_the_first_line_name_the_engine(tmp_path: Path, no_bullet: N
     assert outcome.output.startswith("Engine: MuJoCo ")
     record = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert [cell["kwargs"]["engine"] for cell in record["configuration"]["cells"]] == ["mujoco"]
+    assert record["provenance"]["engines"] == {"mujoco": "default"}
     assert "BipedWalk-Payload-v0 in MuJoCo" in (tmp_path / "run" / "report.html").read_text()
 
 
@@ -176,13 +177,13 @@ def test_memory_is_left_out_where_no_process_knows_its_own(monkeypatch: pytest.M
 def test_opengl_is_the_systems_own_where_it_has_a_window_system(monkeypatch: pytest.MonkeyPatch) -> None:
     import os
 
-    from artde_gym.sim import mujoco_canvas
+    from artde_gym.sim import opengl
 
     asked = []
     monkeypatch.setattr(sys, "platform", "darwin")
-    monkeypatch.setattr(mujoco_canvas.importlib, "import_module", lambda name: asked.append(name) or _Contexts)
+    monkeypatch.setattr(opengl.importlib, "import_module", lambda name: asked.append(name) or _Contexts)
     before = dict(os.environ)
-    mujoco_canvas._context()
+    opengl.context()
     assert asked == ["mujoco.gl_context"]
     assert dict(os.environ) == before
 

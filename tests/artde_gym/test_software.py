@@ -69,6 +69,15 @@ def provenance_of(record: dict[str, Any]) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("name", WRITERS)
+@pytest.mark.parametrize(("asked", "how"), [({}, "default"), ({"engine": "numpy"}, "asked for")])
+def test_records_say_whether_the_engine_was_asked_for(name, asked, how, tmp_path, monkeypatch):
+    monkeypatch.setattr(sys.modules[__name__], "FLIGHT", {**FLIGHT, **asked})
+    write, record = WRITERS[name]
+    write(tmp_path)
+    assert provenance_of(json.loads((tmp_path / record).read_text()))["engines"] == {"numpy": how}
+
+
+@pytest.mark.parametrize("name", WRITERS)
 def test_results_of_other_software_are_gone_on_with_on_request_only(name, tmp_path):
     run, record = WRITERS[name]
     run(tmp_path)

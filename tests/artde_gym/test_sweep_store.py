@@ -268,7 +268,7 @@ def test_other_software_is_refused(tmp_path, whole, monkeypatch):
     provenance = sweep_store.provenance
     now = provenance()
     now["packages"]["numpy"] = "1.0"
-    monkeypatch.setattr(sweep_store, "provenance", lambda *_: now)
+    monkeypatch.setattr(sweep_store, "provenance", lambda *_, **_others: now)
     with pytest.raises(StoreError, match=r"version of numpy '1\.0' differs.*new folder"):
         stored(tmp_path / "whole", [row(9)])
     pd.testing.assert_frame_equal(read_sweep(tmp_path / "whole"), whole, check_exact=True)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +31,25 @@ def test_brackets_in_a_folder_are_printed_as_they_are(command: str, tmp_path: Pa
     answer = CliRunner().invoke(app, line)
     assert answer.exit_code == 0, answer.output
     assert str(folder) in answer.output.replace("\n", "")
+
+
+@pytest.mark.parametrize(
+    "locale",
+    [
+        {"PYTHONIOENCODING": "ascii"},
+        {"PYTHONIOENCODING": "", "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
+    ],
+)
+def test_letters_that_a_terminal_does_not_know_end_nothing(locale: dict[str, str], tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "artde_gym.cli", "evaluate", *FLYER.split(), "--env-kwargs", '{"duration": 0.1}']
+    done = subprocess.run(
+        [*command, "--out", "l\u00e4uft \u2192", "--report"], capture_output=True, text=True, cwd=tmp_path,
+        env={**os.environ, **locale}, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "Report: l" in done.stdout
+    (folder,) = tmp_path.iterdir()
+    assert "l\u00e4uft \u2192 --report" in (folder / "report.html").read_text(encoding="utf-8")
 
 
 def test_no_scenario_is_named_whose_disturbances_were_replaced(tmp_path: Path) -> None:

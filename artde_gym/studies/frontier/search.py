@@ -39,7 +39,7 @@ import pandas as pd
 
 from artde_gym.deprecation import takes_old_names
 from artde_gym.evaluation import statistics
-from artde_gym.evaluation.cells import Cell
+from artde_gym.evaluation.cells import Cell, engines_of
 from artde_gym.evaluation.evaluate import run_plan
 from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.plan import Plan
@@ -130,7 +130,7 @@ def frontier(
     )
     design = Design.of(plan, axis(plan.cells[0].env_id, vary, low, high, tolerance, harder), survival, scenario)
     configuration = {**_configuration(plan, design), **({"grid": True} if grid else {})}
-    store = None if out is None else FrontierStore(Path(out), configuration, allow_mixed)
+    store = None if out is None else FrontierStore(Path(out), configuration, engines_of(plan.cells), allow_mixed)
     return _Levels(plan, design, store, on_progress).search(grid=grid)
 
 

@@ -17,12 +17,14 @@ GRID = "grid"
 class FrontierStore:
     """The folder of one frontier, claimed by its record."""
 
-    def __init__(self, path: Path, configuration: Mapping[str, Any], allow_mixed: bool) -> None:
+    def __init__(
+        self, path: Path, configuration: Mapping[str, Any], engines: Mapping[str, str], allow_mixed: bool
+    ) -> None:
         self.path = path
         self._configuration = plain_configuration(configuration)
         before = claim(path, RECORD, self._configuration)
         begun = before if self._begun else None
-        self._provenance = continued(path, begun, provenance(), allow_mixed=allow_mixed)
+        self._provenance = continued(path, begun, provenance(engines=engines), allow_mixed=allow_mixed)
         if before is None or MIXED in self._provenance:
             self._write_record(None)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,8 +11,8 @@ import scipy  # its `stats`, half a second, is imported when it is first used: n
 from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
-from artde_gym.errors import MissingDependencyError
 from artde_gym.evaluation.statistics import CONFIDENCE
+from artde_gym.extras import needs
 
 DEPTH = 3
 FOLDS = 5
@@ -109,11 +108,9 @@ def _scikit_learn() -> tuple[Any, Any, Any]:
     Raises:
         MissingDependencyError: if it is not installed.
     """
-    try:
-        found = [importlib.import_module(f"sklearn.{name}") for name in ("inspection", "model_selection", "tree")]
-    except ImportError as error:
-        raise MissingDependencyError("package", "scikit-learn", "pip install 'artde-gym[multiverse]'") from error
-    return found[0], found[1], found[2]
+    with needs("multiverse"):
+        from sklearn import inspection, model_selection, tree
+    return inspection, model_selection, tree
 
 
 def _node(fitted: Any, x: Array, y: NDArray[Any], classes: Sequence[str], exponents: NDArray[Any]) -> Node:

@@ -19,6 +19,7 @@ from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.rollout import Episode
 from artde_gym.evaluation.tasks import Progress, Update, labels_of
 from artde_gym.evaluation.workers import check_picklable, check_workers, run_jobs
+from artde_gym.extras import require
 from artde_gym.studies.multiverse.design import MATCHED, Design, load
 from artde_gym.studies.multiverse.job import Job, Numbered, check_points, jobs_of, run
 from artde_gym.studies.multiverse.result import Multiverse, read_multiverse
@@ -26,7 +27,7 @@ from artde_gym.studies.reproduce.reproduction import mean_gains
 from artde_gym.studies.sweep import parquet
 from artde_gym.studies.sweep.design import Design as SweepDesign
 from artde_gym.studies.sweep.design import SweepCell
-from artde_gym.studies.sweep.execution import evidence_of, refuse_others
+from artde_gym.studies.sweep.execution import engines_in, evidence_of, refuse_others
 from artde_gym.studies.sweep.store import SweepStore, read_sweep
 
 OnProgress = Callable[[str, Update], None]
@@ -66,7 +67,7 @@ def multiverse(
         WorkerError: if workers keep ending before their episodes do.
     """
     check_workers(workers)
-    parquet.pyarrow()
+    require("multiverse", "pyarrow", "yaml")
     plan = load(design, engine=engine, worlds=worlds, seed=seed, vectorized=vectorized)
     first = plan.points()
     if workers > 1:
@@ -81,7 +82,7 @@ def multiverse(
         refuse_others(as_sweep, store)
         _check(plan, first, store, on_progress)
         types = parquet.types_of(_columns(plan, number, point) for (number, _), point in known.items())
-        store.begin(plan.text, types, evidence_of(as_sweep), allow_mixed=allow_mixed)
+        store.begin(plan.text, types, evidence_of(as_sweep), engines_in(as_sweep), allow_mixed=allow_mixed)
         for what, points in ((_FIRST, lambda: first), (_SECOND, lambda: _second_pass(plan, _stored(store)))):
             complete = complete and _run(plan, points(), store, workers, on_progress and _named(on_progress, what))
             store.flush()

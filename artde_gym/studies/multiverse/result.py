@@ -16,6 +16,7 @@ import pandas as pd
 from artde_gym.arrays import Array
 from artde_gym.errors import OptionError, StoreError
 from artde_gym.evaluation import statistics
+from artde_gym.extras import require
 from artde_gym.studies.multiverse.claims import OUTCOMES, WorldTable
 from artde_gym.studies.multiverse.deciding import Deciding, what_decides
 from artde_gym.studies.multiverse.design import MATCHED, Design, design
@@ -145,8 +146,9 @@ def read_multiverse(folder: str | Path) -> Multiverse:
 
     Raises:
         StoreError: if the folder holds no multiverse, or a file in it is corrupt.
-        OptionError: without pyarrow.
+        MissingDependencyError: without pyarrow.
     """
+    require("multiverse", "pyarrow")
     folder = Path(folder)
     run = last_run(folder)
     if run is None:

@@ -128,14 +128,14 @@ def reproduce(
     if ablation and ADAPTIVE not in names:
         problem = f"lack {ADAPTIVE!r}, from which the ablation takes its gain"
         raise OptionError("controllers", names, "add it, or pass ablation=False", problem)
-    vectorized, engine = fastest_engine(find_scenario(chosen[0]).env_id, engine)
+    vectorized, _ = fastest_engine(find_scenario(chosen[0]).env_id, engine)
     plan = Plan.of(
         names,
         scenario=chosen,
         episodes=_episodes(vectorized) if episodes is None else episodes,
         seed=seed,
         workers=workers,
-        env_kwargs={"engine": engine},
+        env_kwargs={} if engine is None else {"engine": engine},
         vectorized=vectorized,
         record_episodes=RECORD_EPISODES,
         allow_mixed=allow_mixed,
@@ -182,7 +182,7 @@ def _grid(
         seed=plan.seed,
         workers=plan.workers,
         out=folder / "curves" / scenario,
-        env_kwargs={"engine": cell.kwargs["engine"]},
+        env_kwargs={"engine": cell.kwargs["engine"]} if cell.engine_asked else {},
         vectorized=plan.vectorized,
         allow_mixed=plan.allow_mixed,
         on_progress=on_progress and (lambda value, update: on_progress(f"{path} {value:g} in {scenario}", update)),

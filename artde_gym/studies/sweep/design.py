@@ -38,11 +38,12 @@ from artde_gym.arguments import check_bool
 from artde_gym.deprecation import current_column, current_disturbances, warn
 from artde_gym.disturbances import DISTURBANCES
 from artde_gym.disturbances.kinds import parameters_of
-from artde_gym.errors import MissingDependencyError, OptionError, UnknownNameError, suggest_names
+from artde_gym.errors import OptionError, UnknownNameError, suggest_names
 from artde_gym.evaluation import canonical
 from artde_gym.evaluation.cells import Cell, cells_of
 from artde_gym.evaluation.environments import robot_of
 from artde_gym.evaluation.identity import identity_of
+from artde_gym.extras import needs
 from artde_gym.registration import ControllerSpec, registered_controllers
 from artde_gym.scenarios import scenario as find_scenario
 from artde_gym.studies.frontier.axis import placed
@@ -113,12 +114,10 @@ def read(path: str | Path) -> dict[str, Any]:
     Raises:
         OptionError: if it is not readable, or not a YAML mapping of plain values.
     """
-    try:
+    with needs("sweep"):
         import yaml
 
         from artde_gym.studies.sweep.yaml12 import Loader
-    except ImportError as error:
-        raise MissingDependencyError("package", "pyyaml", "pip install 'artde-gym[sweep]'") from error
 
     try:
         with Path(path).open("rb") as file:
@@ -339,7 +338,10 @@ def point_of(settings: Mapping[str, Any], vectorized: bool, names: set[Any]) -> 
     gains, seed, spec = settings["gains"].get(controller, {}), settings["seed"], known[controller]
     means = cell._replace(kwargs=canonical.arguments(cell.kwargs, cell.env_id, vectorized))
     decides = [
-        *means,
+        means.name,
+        means.env_id,
+        means.kwargs,
+        means.phases,
         controller,
         identity_of(spec).value,
         canonical.numbers(gains),

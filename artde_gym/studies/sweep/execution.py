@@ -16,13 +16,14 @@ from typing import Any, Literal, get_args
 import pandas as pd
 
 from artde_gym.errors import ArtdeGymError, OptionError, StoreError, suggest_names
-from artde_gym.evaluation.cells import validate_cell
+from artde_gym.evaluation.cells import engines_of, validate_cell
 from artde_gym.evaluation.gains import policy_for
 from artde_gym.evaluation.identity import behind
 from artde_gym.evaluation.lock import writes_folder
 from artde_gym.evaluation.rollout import Episode
 from artde_gym.evaluation.tasks import Case, Progress, Task, Update, labels_of, run_task, task_of, tasks_of
 from artde_gym.evaluation.workers import Runs, check_picklable, check_workers, run_jobs
+from artde_gym.extras import require
 from artde_gym.studies.sweep import parquet
 from artde_gym.studies.sweep.design import Design, SweepCell, design, read
 from artde_gym.studies.sweep.ray_workers import check_address, run_on_ray
@@ -93,7 +94,7 @@ def sweep(
     with SweepStore(Path(out)) as store:
         refuse_others(plan, store)
         _check(plan, points, store.done, on_progress)
-        store.begin(plan.text, types, evidence_of(plan), allow_mixed=allow_mixed)
+        store.begin(plan.text, types, evidence_of(plan), engines_in(plan), allow_mixed=allow_mixed)
         total = len(points) * plan.episodes
         progress = Progress(len(store.done), total, on_progress and functools.partial(on_progress, "episodes"))
 
@@ -116,7 +117,10 @@ def _check_executor(executor: Any, address: Any) -> None:
         raise OptionError("executor", executor, allowed)
     if address is not None and executor != "ray":
         raise OptionError("address", address, "pass executor='ray'", "is of no use without Ray")
-    parquet.pyarrow()
+    if executor == "ray":
+        require("scale", "pyarrow", "ray", "yaml")
+    else:
+        require("sweep", "pyarrow", "yaml")
     if address is not None:
         check_address(address)
 
@@ -188,6 +192,11 @@ def evidence_of(plan: Design) -> dict[str, str]:
         policy = policy_for(point.spec, validate_cell(plan.vectorized, point.cell), point.gains)
         found |= behind(point.controller, point.cell.env_id, point.spec, policy)
     return found
+
+
+def engines_in(plan: Design) -> dict[str, str]:
+    """Return the engines of a sweep, and whether each one was asked for."""
+    return engines_of(point.cell for point in plan.points)
 
 
 def _place(point: SweepCell) -> tuple[str, str, str]:

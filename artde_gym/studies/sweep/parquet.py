@@ -13,7 +13,8 @@ import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from artde_gym.errors import MissingDependencyError, StoreError
+from artde_gym.errors import StoreError
+from artde_gym.extras import needs
 
 SCHEMA = 2
 LABELS = {"cell": "text", "controller": "text", "env": "text", "scenario": "text", "seed": "seed", "episode": "whole"}
@@ -31,11 +32,9 @@ def pyarrow() -> Any:
     Raises:
         MissingDependencyError: if it is not installed.
     """
-    try:
+    with needs("sweep"):
         import pyarrow
         import pyarrow.parquet
-    except ImportError as error:
-        raise MissingDependencyError("package", "pyarrow", "pip install 'artde-gym[sweep]'") from error
     return pyarrow
 
 

@@ -10,9 +10,10 @@ import sys
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from artde_gym.errors import MissingDependencyError, OptionError, WorkerError
+from artde_gym.errors import OptionError, WorkerError
 from artde_gym.evaluation.provenance import software
 from artde_gym.evaluation.workers import AHEAD, FEWER, PATIENCE, Job, Runs, Work
+from artde_gym.extras import needs
 
 ANSWER_TIMEOUT_S = 4.0  # until a cluster has answered
 JOIN_TIMEOUT_S = 14.0  # until a process has joined it
@@ -65,10 +66,8 @@ def run_on_ray(work: Work, jobs: Iterable[Job], workers: int, address: str | Non
 
 
 def _ray() -> Any:
-    try:
+    with needs("scale"):
         import ray
-    except ImportError as error:
-        raise MissingDependencyError("package", "ray", "pip install 'artde-gym[scale]'") from error
     return ray
 
 

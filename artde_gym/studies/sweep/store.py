@@ -75,7 +75,13 @@ class SweepStore:
             self.flush()
 
     def begin(
-        self, sweep: str, types: parquet.Types, behind: Mapping[str, str] | None = None, *, allow_mixed: bool = False
+        self,
+        sweep: str,
+        types: parquet.Types,
+        behind: Mapping[str, str] | None = None,
+        engines: Mapping[str, str] | None = None,
+        *,
+        allow_mixed: bool = False,
     ) -> None:
         """Prepare the folder for episodes: set corrupt files aside, and remove half-written ones.
 
@@ -83,13 +89,14 @@ class SweepStore:
             sweep: content of the sweep file, as JSON.
             types: known columns of its episodes.
             behind: hashes of the controllers' weights and code.
+            engines: physics engines, and whether each one was asked for.
             allow_mixed: whether to resume episodes of other software.
 
         Raises:
             StoreError: if the folder holds something else or episodes of other software, or is not writable.
         """
         before = self._runs[-1]["provenance"] if self.done and self._runs else None
-        made_by = continued(self.folder, before, provenance(behind), allow_mixed=allow_mixed)
+        made_by = continued(self.folder, before, provenance(behind, engines=engines), allow_mixed=allow_mixed)
         run = {"sweep": json.loads(sweep), "provenance": made_by, "complete": False}
         with self._writing():
             if not self._taken:

@@ -10,7 +10,10 @@ import collections
 import re
 from typing import Any
 
-import yaml
+from artde_gym.extras import needs
+
+with needs("sweep"):
+    import yaml
 
 _TAG = "tag:yaml.org,2002:"
 _CORE = {

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from artde_gym.errors import MissingDependencyError
+from artde_gym.extras import needs
 from artde_gym.registration import GainRange
 
 Gains = dict[str, float]
@@ -22,10 +22,8 @@ class Proposer:
     """
 
     def __init__(self, seed: int) -> None:
-        try:
+        with needs("tune"):
             import optuna
-        except ImportError as error:
-            raise MissingDependencyError("package", "optuna", "pip install 'artde-gym[tune]'") from error
         self._optuna = optuna
         self._seed = seed
         optuna.logging.set_verbosity(optuna.logging.WARNING)  # not one line per trial

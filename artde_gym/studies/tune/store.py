@@ -36,11 +36,16 @@ class TuningStore:
     """The folder of one tuning, created with the first finished trial: an invalid argument leaves none behind."""
 
     def __init__(
-        self, path: Path, configuration: Mapping[str, Any], behind_them: Mapping[str, str], allow_mixed: bool
+        self,
+        path: Path,
+        configuration: Mapping[str, Any],
+        behind_them: Mapping[str, str],
+        engines: Mapping[str, str],
+        allow_mixed: bool,
     ) -> None:
         self.path = path
         self._configuration = plain_configuration(configuration)
-        self._provenance = provenance(behind_them)
+        self._provenance = provenance(behind_them, engines=engines)
         self.rows: list[dict[str, Any]] = []
         if path.exists() and not is_empty(path):
             before = claim(path, RECORD, self._configuration)

@@ -31,7 +31,7 @@ from artde_gym.arguments import check_integer
 from artde_gym.deprecation import takes_old_names
 from artde_gym.errors import OptionError
 from artde_gym.evaluation import canonical
-from artde_gym.evaluation.cells import Cell, shared_kwargs
+from artde_gym.evaluation.cells import Cell, engines_of, shared_kwargs
 from artde_gym.evaluation.columns import check_metric
 from artde_gym.evaluation.environments import metrics_spec_of, single, single_arguments, with_engine
 from artde_gym.evaluation.evaluate import run_plan
@@ -145,7 +145,10 @@ def tune(
         "seed": seed,
         **({} if metric is None else {"metric": metric}),
     }
-    store = None if out is None else TuningStore(Path(out), configuration, _behind(names, plan.cells[0]), allow_mixed)
+    store = None
+    if out is not None:
+        behind_them = _behind(names, plan.cells[0])
+        store = TuningStore(Path(out), configuration, behind_them, engines_of(plan.cells), allow_mixed)
     return search.run(trials, held_out, store)
 
 
