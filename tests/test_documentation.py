@@ -137,6 +137,7 @@ def test_command_parses(words):
     parse(words)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("words", MENTIONS.values(), ids=MENTIONS)
 def test_mentioned_command_parses_as_far_as_it_goes(words):
     with contextlib.suppress(typer.BadParameter):  # of which a missing one is a kind; an unknown option is none
@@ -282,6 +283,7 @@ def test_a_law_without_a_page_gets_one_of_its_docstrings_and_code(monkeypatch):
         assert part in page
 
 
+@pytest.mark.once
 def test_an_arm_under_its_exact_model_obeys_the_designed_error():
     """Computed torque leaves no error but that of a torque held for a sampling period: the plant is what it says."""
     gains = ComputedTorqueGains(25.0, 10.0)
@@ -296,6 +298,7 @@ PATH = re.compile(r"`((?:[\w.-]+/)+[\w.-]+\.(?:py|md|ya?ml|toml|txt|css|js|mjs))
 MADE = ("runs/", "site/", "gallery/")  # by commands that a page shows
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("name", [*PAGES, "README"])
 def test_files_that_a_page_names_exist(name):
     text = README if name == "README" else PAGES[name]
@@ -308,6 +311,7 @@ def test_the_list_of_commands_shows_whole_sentences(name):
     assert not WHOLE.commands[name].get_short_help_str(SHORTEST).endswith("...")
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("name", ["README", "use.md", "index.md", "tutorials/first-run.md", "tutorials/multiverse.md"])
 def test_a_walk_of_a_first_example_takes_steps(name):
     text = README if name == "README" else PAGES[name]

@@ -53,6 +53,7 @@ def test_wilson_interval_known_value() -> None:
     assert statistics.rate(5, 5).high == pytest.approx(1)
 
 
+@pytest.mark.once
 def test_bootstrap_interval_covers_the_mean_as_often_as_it_says() -> None:
     rng = np.random.default_rng(0)
     inside = 0
@@ -62,6 +63,7 @@ def test_bootstrap_interval_covers_the_mean_as_often_as_it_says() -> None:
     assert 0.88 <= inside / 200 <= 0.99
 
 
+@pytest.mark.once
 def test_intervals_of_many_values_join_those_of_few() -> None:
     """Beyond `MANY` values the central limit's interval takes over from the bootstrap's."""
     rng = np.random.default_rng(0)

@@ -46,6 +46,7 @@ def test_a_sharp_step_lies_between_its_levels() -> None:
     assert half_point(steps([36.0] * 20), GRID) == (37.0, 36.0, 38.0, 20)
 
 
+@pytest.mark.once
 def test_the_interval_covers_the_true_half_point() -> None:
     """Edges scatter about 41 with a standard deviation of 4: about 95 % of the intervals contain 41."""
     rng = np.random.default_rng(0)
@@ -222,6 +223,7 @@ def test_an_interrupted_grid_goes_on(vary: str, tmp_path: Path) -> None:
     pd.testing.assert_frame_equal(whole.levels, frontier(names, env_id, vary, **options).levels)
 
 
+@pytest.mark.once
 def test_levels_side_by_side_are_each_level_alone() -> None:
     """To the bit: nothing of an episode depends on what runs beside it."""
     kwargs: dict[str, Any] = {"duration": 2.6, "control_period": 0.004}
