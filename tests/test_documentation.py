@@ -49,14 +49,16 @@ MENTIONS = {" ".join(words): words for text in (README, *PAGES.values()) for wor
 def scripts() -> dict[str, str]:
     """All blocks of a page as one script, in their order; those of the README and of `use.md` one by one.
 
-    Pages that are notebooks too run as such.
+    Pages that are notebooks too run as such. The examples of the environments, of one template, are one script.
     """
     apart = {"README": README, "use.md": PAGES["use.md"]}
     found = {
         f"{name}-{number}": script([part]) for name, text in apart.items() for number, part in enumerate(blocks(text))
     }
-    found |= {name: script(blocks(text)) for name, text in PAGES.items() if name not in {*NOTEBOOKS, *apart}}
-    return {name: text for name, text in found.items() if text}
+    pages = {name: script(blocks(text)) for name, text in PAGES.items() if name not in {*NOTEBOOKS, *apart}}
+    made = [name for name in pages if name.startswith("environments/")]
+    found["environments"] = "\n".join(pages.pop(name) for name in made)
+    return {name: text for name, text in (found | pages).items() if text}
 
 
 SCRIPTS = scripts()
@@ -110,10 +112,10 @@ def test_there_is_enough_to_run():
 
 
 def needing(name: str) -> Any:
-    """A script by name, marked if it needs PyTorch; of the tutorials only the first run, too, runs on each Python."""
+    """A script by name, marked if it needs PyTorch; what a newcomer tries first runs on each Python."""
     torch = any(package in SCRIPTS[name] for package in ("stable_baselines3", "import torch"))
-    further = name.startswith("tutorials") and "first-run" not in name
-    return pytest.param(name, marks=[pytest.mark.torch] * torch + [pytest.mark.once] * further)
+    first = name.startswith("README") or name in ("index.md", "environments")
+    return pytest.param(name, marks=[pytest.mark.torch] * torch + [pytest.mark.once] * (not first))
 
 
 @pytest.mark.parametrize("name", [needing(name) for name in SCRIPTS])

@@ -353,8 +353,8 @@ def test_a_running_cluster_that_loses_a_worker_gives_the_same_bits(tmp_path, fil
         pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
         with subprocess.Popen(arguments, env=env, text=True, **pipes) as process:
             worker = None
-            while worker is None and process.poll() is None:
-                worker = busy_worker_of(address)
+            while process.poll() is None and (worker := busy_worker_of(address)) is None:
+                time.sleep(0.02)
             if worker is not None:
                 os.kill(worker, signal.SIGKILL)
             _, errors = process.communicate(timeout=300)
