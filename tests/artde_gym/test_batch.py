@@ -115,7 +115,11 @@ def test_bipeds_in_batches_are_single_ones_to_the_bit(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("disturbances", "ways"), [(WINDY, [(1, 1), (4, 2)]), (FAILING, [(1, 1), (3, 1)])], ids=["windy", "failing"]
+    ("disturbances", "ways"),
+    [
+        pytest.param(WINDY, [(1, 1), (4, 2)], id="windy"),
+        pytest.param(FAILING, [(1, 1), (3, 1)], id="failing", marks=pytest.mark.once),
+    ],
 )
 def test_chunks_and_workers_do_not_change_a_bit(
     disturbances: Any, ways: list[tuple[int, int]], monkeypatch: pytest.MonkeyPatch
@@ -226,7 +230,7 @@ def test_an_environment_without_a_vector_is_refused(monkeypatch: pytest.MonkeyPa
         evaluate(["tde"], "Alone-v0", episodes=1, vectorized=True)
 
 
-@pytest.mark.parametrize("vectorized", [False, True])
+@pytest.mark.parametrize("vectorized", [False, pytest.param(True, marks=pytest.mark.once)])
 def test_command_prints_table_31_beside_ours(vectorized: bool, tmp_path: Path) -> None:
     arguments = ["evaluate", "--env", QUADROTOR, "--controllers", "tde,atde,artde,asmc", *["--vectorized"] * vectorized]
     arguments += ["--episodes", "2", "--workers", "1", "--out", str(tmp_path / "run")]

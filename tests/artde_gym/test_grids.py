@@ -169,6 +169,7 @@ def test_who_survives_more_needs_all_of_them() -> None:
 # ---------------------------------------------------------------- the real thing
 
 
+@pytest.mark.once
 def test_rates_of_a_grid_are_those_of_its_episodes(tmp_path: Path) -> None:
     """Payloads that four rotors lift, hardly lift, and do not lift; counted by hand in the table of episodes."""
     grid: dict[str, Any] = {"low": 1.0, "high": 2.0, "tolerance": 0.25, "episodes": 6, "seed": 3, "grid": True}
@@ -256,6 +257,7 @@ def test_disturbances_of_a_vector_are_a_mapping_or_one_for_each(wrong: Any) -> N
         env.reset(seed=0, options={"disturbances": wrong})
 
 
+@pytest.mark.once
 def test_grid_of_the_ground_force_is_the_thesis_force_in_a_scenario() -> None:
     for name, payload in (("S1", False), ("S2", True)):
         disturbances, arguments = standard_test(PUSH, "grf_pulse.magnitude", {}, name)

@@ -46,6 +46,7 @@ def whole(tmp_path_factory) -> pd.DataFrame:
     return sweep(GRID, tmp_path_factory.mktemp("whole")).episodes
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(
     ("given", "arguments"),
     [
@@ -73,6 +74,7 @@ def test_its_episodes_are_those_of_evaluate_bit_for_bit(tmp_path, given, argumen
             assert ours.tolist() == theirs[name].tolist()
 
 
+@pytest.mark.once
 def test_a_cell_leaves_nothing_behind_for_the_next_one(tmp_path):
     """Cells that share an environment, in any company and order."""
     disturbances = [{"payload": 1.3}, {}, {"friction": 0.5}]

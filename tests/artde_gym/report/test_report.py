@@ -28,6 +28,8 @@ from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.laws import Laws
 from artde_gym.report.run import Run, nested
 
+pytestmark = pytest.mark.once
+
 
 class Reader(html.parser.HTMLParser):
     """Tags with their attributes, in order."""
