@@ -49,14 +49,16 @@ MENTIONS = {" ".join(words): words for text in (README, *PAGES.values()) for wor
 def scripts() -> dict[str, str]:
     """All blocks of a page as one script, in their order; those of the README and of `use.md` one by one.
 
-    Pages that are notebooks too run as such.
+    Pages that are notebooks too run as such. The examples of the environments, of one template, are one script.
     """
     apart = {"README": README, "use.md": PAGES["use.md"]}
     found = {
         f"{name}-{number}": script([part]) for name, text in apart.items() for number, part in enumerate(blocks(text))
     }
-    found |= {name: script(blocks(text)) for name, text in PAGES.items() if name not in {*NOTEBOOKS, *apart}}
-    return {name: text for name, text in found.items() if text}
+    pages = {name: script(blocks(text)) for name, text in PAGES.items() if name not in {*NOTEBOOKS, *apart}}
+    made = [name for name in pages if name.startswith("environments/")]
+    found["environments"] = "\n".join(pages.pop(name) for name in made)
+    return {name: text for name, text in (found | pages).items() if text}
 
 
 SCRIPTS = scripts()
@@ -110,10 +112,10 @@ def test_there_is_enough_to_run():
 
 
 def needing(name: str) -> Any:
-    """A script by name, marked if it needs PyTorch; of the tutorials only the first run, too, runs on each Python."""
+    """A script by name, marked if it needs PyTorch; what a newcomer tries first runs on each Python."""
     torch = any(package in SCRIPTS[name] for package in ("stable_baselines3", "import torch"))
-    further = name.startswith("tutorials") and "first-run" not in name
-    return pytest.param(name, marks=[pytest.mark.torch] * torch + [pytest.mark.once] * further)
+    first = name.startswith("README") or name in ("index.md", "environments")
+    return pytest.param(name, marks=[pytest.mark.torch] * torch + [pytest.mark.once] * (not first))
 
 
 @pytest.mark.parametrize("name", [needing(name) for name in SCRIPTS])
@@ -137,6 +139,7 @@ def test_command_parses(words):
     parse(words)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("words", MENTIONS.values(), ids=MENTIONS)
 def test_mentioned_command_parses_as_far_as_it_goes(words):
     with contextlib.suppress(typer.BadParameter):  # of which a missing one is a kind; an unknown option is none
@@ -282,6 +285,7 @@ def test_a_law_without_a_page_gets_one_of_its_docstrings_and_code(monkeypatch):
         assert part in page
 
 
+@pytest.mark.once
 def test_an_arm_under_its_exact_model_obeys_the_designed_error():
     """Computed torque leaves no error but that of a torque held for a sampling period: the plant is what it says."""
     gains = ComputedTorqueGains(25.0, 10.0)
@@ -296,6 +300,7 @@ PATH = re.compile(r"`((?:[\w.-]+/)+[\w.-]+\.(?:py|md|ya?ml|toml|txt|css|js|mjs))
 MADE = ("runs/", "site/", "gallery/")  # by commands that a page shows
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("name", [*PAGES, "README"])
 def test_files_that_a_page_names_exist(name):
     text = README if name == "README" else PAGES[name]
@@ -308,6 +313,7 @@ def test_the_list_of_commands_shows_whole_sentences(name):
     assert not WHOLE.commands[name].get_short_help_str(SHORTEST).endswith("...")
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("name", ["README", "use.md", "index.md", "tutorials/first-run.md", "tutorials/multiverse.md"])
 def test_a_walk_of_a_first_example_takes_steps(name):
     text = README if name == "README" else PAGES[name]

@@ -9,6 +9,8 @@ from documentation.replays import OF_ENVIRONMENTS, SHOWN
 
 from artde_gym.evaluation.environments import ours
 
+pytestmark = pytest.mark.once
+
 DOCS = Path(__file__).parents[1] / "docs"
 LARGEST = 100e3  # bytes, beside the viewer that all share
 

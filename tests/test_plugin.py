@@ -184,10 +184,12 @@ def test_without_a_drive_it_has_the_joint_space_laws_and_no_presets(tmp_path: Pa
     assert "none: the robot has no presets" in fourth
 
 
+@pytest.mark.once
 def test_a_residual_of_zero_is_the_base_and_any_other_accelerates_joints(tmp_path: Path) -> None:
     run(tmp_path, install(tmp_path), AGENT)
 
 
+@pytest.mark.once
 def test_it_can_be_played_with(tmp_path: Path) -> None:
     run(tmp_path, install(tmp_path), PLAY)
 
@@ -227,6 +229,7 @@ except OptionError as error:
     assert sorted(pd.read_csv(tmp_path / "run/episodes.csv")["controller"]) == ["rest", "tde"]
 
 
+@pytest.mark.once
 def test_no_file_of_the_project_names_it() -> None:
     files = [file for package in ("artde_gym", "baselines", "controllers") for file in (ROOT / package).rglob("*.py")]
     assert files
@@ -240,6 +243,7 @@ OWN = re.compile(
 """Modules of the project's own robots; the linear balance law is the biped's."""
 
 
+@pytest.mark.once
 def test_its_own_robots_are_plug_ins_too() -> None:
     for package in ("artde_gym", "baselines", "controllers"):
         for file in (ROOT / package).rglob("*.py"):

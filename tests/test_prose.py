@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from documentation.pages import ROOT
 
+pytestmark = pytest.mark.once
+
 PACKAGES = ("artde_gym", "controllers", "baselines", "scripts")
 OPENINGS = re.compile(r"(What|Whether|Those|Where|How|Who|Which)\b(?![^.]*\?)")  # a question may open so
 WORDS = re.compile(

@@ -14,6 +14,8 @@ from artde_gym.disturbances.ground_effect import thrust_gain
 from artde_gym.disturbances.noise import draw_keys, normal_noise, uniform_noise
 from artde_gym.disturbances.wind import GRID, Wind
 
+pytestmark = pytest.mark.once
+
 KEYS = draw_keys(np.random.default_rng(0), 3)
 INDEX = np.arange(200_000, dtype=np.uint64)
 

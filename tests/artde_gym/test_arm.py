@@ -100,6 +100,7 @@ def test_the_built_in_arm_agrees_with_pinocchio(judge):
         np.testing.assert_allclose(*forces, rtol=0, atol=1e-9)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("kind", KINDS)
 def test_references_are_smooth_and_begin_at_rest(kind):
     time = 1e-3 * np.arange(12_001)
@@ -169,6 +170,7 @@ def test_the_environment_passes_gymnasiums_check(engine_name):
     env.close()
 
 
+@pytest.mark.once
 def test_the_arm_starts_in_equilibrium(engine_name):
     load = {"payload": {"mass": 2.0, "position": [0.0, 0.05, 0.1]}, "mass_scale": 1.1}
     env = make(engine=engine_name, disturbances=load)
@@ -183,6 +185,7 @@ def test_the_arm_starts_in_equilibrium(engine_name):
     env.close()
 
 
+@pytest.mark.once
 def test_friction_takes_energy_and_scales():
     task = Tracking.of("panda", None, None, None, PICK, 0.001, 1.0)
     qd = np.random.default_rng(0).normal(size=(20, 7))
@@ -192,6 +195,7 @@ def test_friction_takes_energy_and_scales():
     assert (np.abs(task.friction(1.0, 100 * qd)) <= task.coulomb).all()
 
 
+@pytest.mark.once
 @pytest.mark.bullet
 def test_both_engines_walk_one_path():
     paths = []
@@ -209,6 +213,7 @@ def panda_layout() -> Any:
     return observation_layout(panda())
 
 
+@pytest.mark.once
 def test_an_episode_repeats_bitwise(engine_name):
     env = make(engine=engine_name)
     first = run(env)
@@ -219,6 +224,7 @@ def test_an_episode_repeats_bitwise(engine_name):
         one.close()
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("period", [0.001, 0.004])
 @pytest.mark.parametrize("law", ["tde", "artde"])
 def test_a_batch_is_bitwise_a_loop(period, law):
@@ -326,6 +332,7 @@ def test_joints_have_to_lie_on_the_way_to_the_tip(tmp_path):
 # ----------------------------------------------------------------------------------------------------------- design
 
 
+@pytest.mark.once
 def test_designed_gains_are_valid_all_over_the_workspace():
     gains = design_arm(panda(), 0.001)
     eigenvalues = tde_eigenvalues(workspace_inertia(panda()), gains.m_bar)
@@ -334,6 +341,7 @@ def test_designed_gains_are_valid_all_over_the_workspace():
     assert gains.k_d == pytest.approx(2 * math.sqrt(gains.k_p))
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("inertia", [(0.2, 1.0), (0.5, 1.4), (0.05, 0.9)])
 @pytest.mark.parametrize("period", [0.001, 0.004])
 def test_the_bandwidths_limit_is_where_a_mode_becomes_unstable(inertia, period):
@@ -366,6 +374,7 @@ def test_an_arm_without_rotors_is_designed_with_a_warning(tmp_path):
     env.close()
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("law", ["tde", "artde", "atde", "pid", "tde+c", "tde+kd", "artde-robust", "computed-torque"])
 def test_a_file_that_no_law_has_seen_is_tracked(tmp_path, law, engine_name):
     load = {"payload": {"mass": 2.0, "attach_time": 0.2, "detach_time": 0.4}}

@@ -49,6 +49,7 @@ def signals_of(path: Path) -> dict[str, Any]:
     return {name: stored[name] for name in stored.files if not name.startswith(KEY)}
 
 
+@pytest.mark.once
 def test_batch_is_single_within_the_physics() -> None:
     single: Any
     batch: Any
@@ -73,6 +74,7 @@ def test_batch_is_single_within_the_physics() -> None:
     np.testing.assert_allclose(batch["reward"], single["reward"], rtol=1e-3)
 
 
+@pytest.mark.once
 def test_crashes_are_those_of_single() -> None:
     single: Any
     batch: Any
@@ -84,6 +86,7 @@ def test_crashes_are_those_of_single() -> None:
     np.testing.assert_allclose(batch["rmse_m_x"], single["rmse_m_x"], atol=2e-3)
 
 
+@pytest.mark.once
 def test_bipeds_in_batches_are_single_ones_to_the_bit(tmp_path: Path) -> None:
     """Metrics and signals of walks that fall and of walks that do not; in the same engine nothing may differ."""
     ahead = {"magnitude": {"uniform": [1.0, 250.0]}, "start": 0.1, "duration": 0.1}
@@ -112,7 +115,11 @@ def test_bipeds_in_batches_are_single_ones_to_the_bit(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("disturbances", "ways"), [(WINDY, [(1, 1), (4, 2)]), (FAILING, [(1, 1), (3, 1)])], ids=["windy", "failing"]
+    ("disturbances", "ways"),
+    [
+        pytest.param(WINDY, [(1, 1), (4, 2)], id="windy"),
+        pytest.param(FAILING, [(1, 1), (3, 1)], id="failing", marks=pytest.mark.once),
+    ],
 )
 def test_chunks_and_workers_do_not_change_a_bit(
     disturbances: Any, ways: list[tuple[int, int]], monkeypatch: pytest.MonkeyPatch
@@ -123,6 +130,7 @@ def test_chunks_and_workers_do_not_change_a_bit(
         same(whole, fly(disturbances=disturbances, workers=workers))
 
 
+@pytest.mark.once
 def test_more_episodes_leave_the_first_ones_as_they_were() -> None:
     few: Any
     many: Any
@@ -222,7 +230,7 @@ def test_an_environment_without_a_vector_is_refused(monkeypatch: pytest.MonkeyPa
         evaluate(["tde"], "Alone-v0", episodes=1, vectorized=True)
 
 
-@pytest.mark.parametrize("vectorized", [False, True])
+@pytest.mark.parametrize("vectorized", [False, pytest.param(True, marks=pytest.mark.once)])
 def test_command_prints_table_31_beside_ours(vectorized: bool, tmp_path: Path) -> None:
     arguments = ["evaluate", "--env", QUADROTOR, "--controllers", "tde,atde,artde,asmc", *["--vectorized"] * vectorized]
     arguments += ["--episodes", "2", "--workers", "1", "--out", str(tmp_path / "run")]

@@ -13,6 +13,8 @@ from artde_gym.disturbances.numeric import numeric, numeric_rows
 from artde_gym.robots.q450 import task
 from artde_gym.sim.rigid_bodies import MassProperties, composite
 
+pytestmark = pytest.mark.once
+
 MASS = {"uniform": [0.1, 0.5]}
 CASES: list[dict[str, Any]] = [
     {},

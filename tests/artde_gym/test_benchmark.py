@@ -19,6 +19,7 @@ from artde_gym.errors import UnknownNameError
 from artde_gym.sim.engine_loops import body_loop, joint_loop
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_bare_loops_do_what_the_environments_do(engine: str) -> None:
     """The same torques give the same joints to the bit, and the same wrench the same climb."""

@@ -71,6 +71,7 @@ def test_spec_survives_json() -> None:
     assert first == second
 
 
+@pytest.mark.once
 def test_same_seed_same_bits_in_one_process(engine_name: EngineName) -> None:
     env, other = make(disturbances=VARIED, engine=engine_name), make(disturbances=VARIED, engine=engine_name)
     first = trajectory(env, seed=1, steps=300)
@@ -93,6 +94,7 @@ def test_same_seed_same_bits_in_another_process() -> None:
     assert [_trajectory_elsewhere(name) for name in names] == there
 
 
+@pytest.mark.once
 def test_two_environments_in_one_process_do_not_touch_each_other(engine_name: EngineName) -> None:
     alone = trajectory(make(disturbances=VARIED, engine=engine_name), seed=5, steps=100)
     env, disturber = (
@@ -140,6 +142,7 @@ def test_async_vector_env_with_spawn(engine_name: EngineName) -> None:
     assert observations[1].tobytes() == observation.tobytes()
 
 
+@pytest.mark.once
 def test_start_is_at_rest_in_balance_and_without_antagonistic_torques(engine_name: EngineName) -> None:
     env = make(disturbances={}, engine=engine_name)
     observation, _ = env.reset(seed=0)
@@ -153,6 +156,7 @@ def test_start_is_at_rest_in_balance_and_without_antagonistic_torques(engine_nam
     assert fields["contact"].tolist() == [1, 1]
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("mass", [0.0, 1.3, 3.0])
 def test_ground_carries_robot_and_payload(engine_name: EngineName, mass: float) -> None:
     env = make(disturbances={"payload": mass} if mass else {}, engine=engine_name)
@@ -186,6 +190,7 @@ def test_reward_is_the_scaled_sum_of_its_terms() -> None:
     assert all(np.isfinite(value) and 0 <= value <= 1 for value in terms.values())
 
 
+@pytest.mark.once
 def test_a_limp_robot_falls_and_says_why(engine_name: EngineName) -> None:
     env = make(control_period=0.01, engine=engine_name)
     env.reset(seed=0)
@@ -221,6 +226,7 @@ def test_observations_share_no_memory_and_stay_in_bounds(engine_name: EngineName
     assert np.all((path >= env.observation_space.low) & (path <= env.observation_space.high))
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("kwargs", [{"speed": 0.2}, {"actuator_inertia": "lumped"}, {"arms": "revolute"}])
 def test_variants_walk(engine_name: EngineName, kwargs: dict[str, Any]) -> None:
     env = make(**kwargs, engine=engine_name)
@@ -232,6 +238,7 @@ def test_variants_walk(engine_name: EngineName, kwargs: dict[str, Any]) -> None:
     assert distance == pytest.approx(kwargs.get("speed", 0.1) * 1.0, abs=0.03)  # two steps, the last one closes
 
 
+@pytest.mark.once
 def test_without_rotor_inertia_tde_diverges(engine_name: EngineName) -> None:
     env = make(actuator_inertia="none", engine=engine_name)
     policy, state = controllers.make("tde", env), None

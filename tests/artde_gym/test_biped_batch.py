@@ -111,6 +111,7 @@ def walked_together(env: Any, seeds: Any, steps: int, law: str = "tde") -> list[
 # ----------------------------------------------------------------------------------------------- each as the single one
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(
     ("disturbances", "kwargs"),
     [
@@ -130,6 +131,7 @@ def test_batch_is_single_to_the_bit(disturbances: Any, kwargs: dict[str, Any]) -
         assert log == walked_alone(seed, steps, disturbances=disturbances, **kwargs)
 
 
+@pytest.mark.once
 def test_falls_are_those_of_the_single_one() -> None:
     kick = {"body": "chest", "magnitude": {"uniform": [150, 400]}, "direction": ALL_AROUND, "start": 0.0}
     kwargs: dict[str, Any] = {"disturbances": {"push": [kick]}, "duration": 2.0, "control_period": 0.004}
@@ -139,6 +141,7 @@ def test_falls_are_those_of_the_single_one() -> None:
         assert log == walked_alone(seed, 400, "artde", **kwargs)
 
 
+@pytest.mark.once
 def test_a_robot_that_diverges_ends_as_the_single_one() -> None:
     """Bare links under TDE diverge: through speeds beyond all bounds, without a warning."""
     kwargs: dict[str, Any] = {"disturbances": {}, "actuator_inertia": "none", "control_period": 0.01, "duration": 3.0}
@@ -147,6 +150,7 @@ def test_a_robot_that_diverges_ends_as_the_single_one() -> None:
     assert log == walked_alone(0, 250, **kwargs)
 
 
+@pytest.mark.once
 def test_numbers_of_environments_and_threads_do_not_change_a_bit() -> None:
     kwargs: dict[str, Any] = {"disturbances": PUSHED, "duration": 0.1}
     whole = walked_together(make(9, **kwargs), 20, 150)
@@ -155,6 +159,7 @@ def test_numbers_of_environments_and_threads_do_not_change_a_bit() -> None:
     assert walked_together(make(1, **kwargs), [28], 150) == whole[8:]
 
 
+@pytest.mark.once
 def test_same_seed_same_bits_after_other_walks() -> None:
     env = make(2, disturbances=PUSHED, duration=0.1)
     first = walked_together(env, 1, 120)
@@ -225,6 +230,7 @@ def test_observations_are_new_arrays_in_the_space() -> None:
     assert env.observation_space.contains(second)
 
 
+@pytest.mark.once
 def test_others_do_not_notice_a_fall() -> None:
     kwargs: dict[str, Any] = {"disturbances": PUSHED, "duration": 2.0, "control_period": 0.002}
     calm, falling = make(3, **kwargs), make(3, **kwargs)
@@ -336,6 +342,7 @@ def test_bad_resets_and_steps() -> None:
     assert env.step(np.ones((2, 12)))[0].tobytes() == other.step(np.ones((2, 12)))[0].tobytes()  # nothing has changed
 
 
+@pytest.mark.once
 def test_two_vectors_in_one_process_do_not_touch_each_other() -> None:
     alone = walked_together(make(2, disturbances=PUSHED), 3, 40)
     env, disturber = make(2, disturbances=PUSHED), make(3, disturbances={"payload": 3.0}, control_period=0.002)

@@ -7,8 +7,11 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+import pytest
 
 from artde_gym.robots.ojas.task import settled_by
+
+pytestmark = pytest.mark.once
 
 ID = "artde_gym:BipedPush-v0"
 PAYLOAD = {"payload": 1.3, "friction": 0.7}

@@ -23,6 +23,8 @@ from artde_gym.sim.factory import EngineName, make_engine
 from artde_gym.sim.rigid_bodies import MassProperties, RigidBodies
 from artde_gym.sim.sling import Sling
 
+pytestmark = pytest.mark.once
+
 ID = "QuadInfinity-Payload-v0"
 GRAVITY, LOAD, LENGTH, HOOK = 9.81, 0.35, 0.5, (0.0, 0.0, -0.05)
 CENTER = (0.0, 0.0, 0.0)

@@ -57,6 +57,7 @@ def test_median_and_its_interval_are_order_statistics(values: list[float]) -> No
     assert (shrunk.low, shrunk.high) == pytest.approx((np.tanh(found.low / 50), np.tanh(found.high / 50)))
 
 
+@pytest.mark.once
 def test_interval_of_the_median_covers_it_as_often_as_it_says() -> None:
     rng = np.random.default_rng(0)
     inside = 0

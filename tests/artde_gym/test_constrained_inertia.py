@@ -13,6 +13,8 @@ from artde_gym.multibody.spec import RobotSpec
 from artde_gym.robots.ojas.model import ojas
 from artde_gym.robots.ojas.walking import walking_pattern
 
+pytestmark = pytest.mark.once
+
 POSES = walking_pattern(0.1, 1.0, 8.0, 0.001).q[2500:4500:400] + np.random.default_rng(4).normal(
     scale=0.05, size=(5, 12)
 )

@@ -115,6 +115,7 @@ def test_a_step_is_refused_before_a_reset_after_an_end_and_after_close(env: Any)
             call()
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("name", ours())
 def test_a_step_after_a_fall_is_refused(name: str, engine_name: Any) -> None:
     env = make(name, vector=False, duration=3.0, engine=engine_name, disturbances={})
@@ -202,6 +203,7 @@ def test_a_vector_says_where_it_runs(name: str) -> None:
         make(name, vector=True, autoreset_mode="never")
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("mode", AutoresetMode)
 @pytest.mark.parametrize("name", ours())
 def test_autoreset_modes_are_those_of_gymnasiums_own_vectors(name: str, mode: AutoresetMode) -> None:

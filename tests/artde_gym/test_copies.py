@@ -46,6 +46,8 @@ WAYS: dict[str, Callable[[Any], Any]] = {
     "deepcopy": copy.deepcopy,
     "pickle": lambda env: pickle.loads(pickle.dumps(env)),
 }
+BEFORE = [8, pytest.param(50, marks=pytest.mark.once)]
+"""Steps before the copy."""
 
 
 def make(name: str, engine: EngineName) -> Any:
@@ -74,7 +76,7 @@ def go(env: Any, steps: int) -> list[Any]:
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("before", [8, 50])
+@pytest.mark.parametrize("before", BEFORE)
 def test_a_copy_goes_on_as_the_original(name: str, engine_name: EngineName, way: str, before: int) -> None:
     env = make(name, engine_name)
     env.action_space.seed(1)
@@ -89,7 +91,7 @@ def test_a_copy_goes_on_as_the_original(name: str, engine_name: EngineName, way:
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("before", [8, 50])
+@pytest.mark.parametrize("before", BEFORE)
 def test_a_copy_of_a_vector_goes_on_as_the_original(name: str, way: str, before: int) -> None:
     env = make_vec(name)
     env.action_space.seed(1)

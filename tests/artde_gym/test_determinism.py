@@ -15,9 +15,12 @@ from artde_gym.evaluation import evaluate
 from artde_gym.evaluation.tasks import Update
 
 CASES: dict[str, dict[str, Any]] = {
-    "biped in bullet": {"scenario": "S2-L4", "env_kwargs": {"duration": 0.4, "actuator_inertia": "lumped"}},
+    "biped in bullet": {
+        "scenario": "S2-L4",
+        "env_kwargs": {"duration": 0.4, "actuator_inertia": "lumped", "engine": "bullet"},
+    },
     "biped in mujoco": {"scenario": "S2-L4", "env_kwargs": {"duration": 0.4, "engine": "mujoco"}},
-    "quadrotor in bullet": {"scenario": "Q1-gale", "env_kwargs": {"duration": 0.9}},
+    "quadrotor in bullet": {"scenario": "Q1-gale", "env_kwargs": {"duration": 0.9, "engine": "bullet"}},
     "quadrotors in batch": {"scenario": "Q1-gale", "env_kwargs": {"duration": 0.9}, "vectorized": True},
 }
 
@@ -42,7 +45,15 @@ def interrupted(update: Update) -> None:
         raise KeyboardInterrupt
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("biped in bullet", marks=pytest.mark.bullet),
+        "biped in mujoco",
+        pytest.param("quadrotor in bullet", marks=pytest.mark.bullet),
+        pytest.param("quadrotors in batch", marks=pytest.mark.once),
+    ],
+)
 def test_an_evaluation_is_the_same_file_byte_by_byte(name: str, tmp_path: Path) -> None:
     case = CASES[name]
     first = table(tmp_path / "first", case)

@@ -182,6 +182,7 @@ def sample(value: Any, count: int = 4000) -> np.ndarray:
     return np.array([disturbances.sample(rng)["payload"]["position"] for _ in range(count)])
 
 
+@pytest.mark.once
 def test_uniform_and_choice_have_their_moments():
     x, y, z = sample([{"uniform": [-0.1, 0.3]}, {"choice": [0.0, 0.2]}, {"normal": [0.1, 0.05]}]).T
     for drawn, mean, std in [(x, 0.1, 0.4 / math.sqrt(12)), (y, 0.1, 0.1), (z, 0.1, 0.05)]:
@@ -190,6 +191,7 @@ def test_uniform_and_choice_have_their_moments():
     assert np.abs(np.corrcoef([x, y, z]) - np.eye(3)).max() < 0.06
 
 
+@pytest.mark.once
 def test_normal_is_drawn_again_until_in_range():
     drawn = sample([{"normal": [0.5, 0.2]}, 0.0, 0.0])[:, 0]  # half of it lies beyond the range
     assert drawn.max() <= 0.5
@@ -215,6 +217,7 @@ def test_choice_takes_vectors_and_distributions_within_them():
     assert 0.45 < (x > 0).mean() < 0.55
 
 
+@pytest.mark.once
 def test_normal_components_make_an_isotropic_planar_direction():
     normal = {"normal": [0, 1]}
     rng = np.random.default_rng(17)

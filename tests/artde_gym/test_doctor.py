@@ -100,6 +100,7 @@ def _refused(**_: Any) -> Any:
     raise PermissionError(13, "Permission denied")
 
 
+@pytest.mark.once
 def test_validity_names_the_model_that_is_invalid_by_design() -> None:
     lines = {line.what: line for line in stability()}
     assert "outside" in lines["biped, actuators 'none'"].found

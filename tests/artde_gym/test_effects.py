@@ -63,6 +63,7 @@ def walk(period=0.002, engine="mujoco", **disturbances):
     return run(env, round(0.1 / period), np.zeros(12))
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("period", [0.001, 0.004])
 def test_many_walk_as_each_alone_to_the_bit(period):
     options = {"duration": 0.4, "control_period": period, "disturbances": EFFECTS[WALK]}
@@ -76,6 +77,7 @@ def test_many_walk_as_each_alone_to_the_bit(period):
         assert alone.unwrapped.sampled_disturbances == many.unwrapped.sampled_disturbances[i]
 
 
+@pytest.mark.once
 @pytest.mark.bullet
 def test_friction_takes_energy_in_both_engines():
     for engine in ("bullet", "mujoco"):
@@ -83,6 +85,7 @@ def test_friction_takes_energy_in_both_engines():
         assert np.abs(rubbed).sum() < 0.7 * np.abs(free).sum()
 
 
+@pytest.mark.once
 @pytest.mark.bullet
 def test_both_engines_pull_a_base_alike():
     moved = [walk(engine=engine, tether={"stiffness": 50.0}) - walk(engine=engine) for engine in ("bullet", "mujoco")]
@@ -90,10 +93,12 @@ def test_both_engines_pull_a_base_alike():
     np.testing.assert_allclose(moved[0][-1, 60], moved[1][-1, 60], rtol=0.1)  # the base's height
 
 
+@pytest.mark.once
 def test_nothing_is_nothing_to_the_bit():
     np.testing.assert_array_equal(walk(stiction=0.0), walk())
 
 
+@pytest.mark.once
 @pytest.mark.bullet
 def test_a_vehicle_is_pulled_alike_in_engines_and_in_numpy():
     options = {"duration": 3.0, "disturbances": EFFECTS[FLIGHT]}

@@ -19,6 +19,8 @@ from artde_gym.robots.ojas.model import ojas
 from artde_gym.sim.engine import Camera, Engine, State
 from artde_gym.sim.factory import EngineName, make_engine
 
+pytestmark = pytest.mark.once
+
 DT = 0.001
 G = 9.81
 STANDING = 0.45  # m, hip line over the ground, with straight legs

@@ -53,6 +53,7 @@ def test_wilson_interval_known_value() -> None:
     assert statistics.rate(5, 5).high == pytest.approx(1)
 
 
+@pytest.mark.once
 def test_bootstrap_interval_covers_the_mean_as_often_as_it_says() -> None:
     rng = np.random.default_rng(0)
     inside = 0
@@ -62,6 +63,7 @@ def test_bootstrap_interval_covers_the_mean_as_often_as_it_says() -> None:
     assert 0.88 <= inside / 200 <= 0.99
 
 
+@pytest.mark.once
 def test_intervals_of_many_values_join_those_of_few() -> None:
     """Beyond `MANY` values the central limit's interval takes over from the bootstrap's."""
     rng = np.random.default_rng(0)
@@ -123,6 +125,7 @@ def test_thesis_values_and_the_improvements_it_claims() -> None:
 # ---------------------------------------------------------------- evaluate
 
 
+@pytest.mark.once
 def test_same_seed_same_disturbances_whatever_the_controller() -> None:
     episodes: Any = short(episodes=3).episodes
     drawn = [name for name in episodes if name.startswith("disturbance.")]
@@ -179,6 +182,7 @@ def test_policy_objects_and_registered_controllers(workers: int, monkeypatch: py
     assert np.isnan(mine["tde_error_rms"])
 
 
+@pytest.mark.once
 def test_gains_reach_the_controller() -> None:
     soft, stiff = (short(["tde"], episodes=1, gains=gains) for gains in ({"tde": {"k_p": 1.0}}, None))
     assert soft.episodes["rmse_deg"].tolist() != stiff.episodes["rmse_deg"].tolist()
@@ -354,6 +358,7 @@ def test_reproduce_runs_both_robots_in_both_engines(tmp_path: Path, monkeypatch:
     assert run_command("reproduce", "--robot", "bipedal").returncode == 2
 
 
+@pytest.mark.once
 def test_the_ablation_is_as_stiff_as_artde_was_in_the_same_scenario(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -383,6 +388,7 @@ def test_the_ablation_is_as_stiff_as_artde_was_in_the_same_scenario(
     assert not (tmp_path / "other").exists()
 
 
+@pytest.mark.once
 def test_one_command_evaluates_both_robots(tmp_path: Path) -> None:
     arguments = ["evaluate", "--scenario", "S1,Q1", "--controllers", "tde,artde", "--episodes", "1", "--workers", "1"]
     arguments += ["--env-kwargs", json.dumps({"duration": 1.4}), "--out", str(tmp_path / "run")]

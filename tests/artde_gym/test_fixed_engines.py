@@ -15,6 +15,8 @@ from artde_gym.multibody.urdf_reader import read_urdf
 from artde_gym.sim.engine import PAYLOAD_RADIUS
 from artde_gym.sim.factory import make_batch, make_engine
 
+pytestmark = pytest.mark.once
+
 INERTIA = '<inertia ixx="0.02" iyy="0.03" izz="0.025" ixy="0.002" ixz="-0.001" iyz="0.003"/>'
 LIMIT = '<limit lower="-2" upper="2" effort="50" velocity="3"/>'
 

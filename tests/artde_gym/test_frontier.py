@@ -189,6 +189,7 @@ def test_standard_test_is_the_same_but_for_what_is_varied() -> None:
         standard_test("CartPole-v1", "push.magnitude", {})
 
 
+@pytest.mark.once
 def test_same_draws_at_every_level() -> None:
     varied = axis(PUSH, "push.magnitude")
     drawn = []
@@ -327,6 +328,7 @@ def test_bad_arguments_leave_no_folder_behind(
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.once
 def test_quadrotors_in_batches(tmp_path: Path) -> None:
     """Four rotors lift 3.4 kg at most, the vehicle included: 0.5 kg are carried and 2.1 kg are not."""
     kwargs: dict[str, Any] = {"low": 0.5, "high": 2.1, "tolerance": 1.6, "episodes": 3, "env_kwargs": {"duration": 2.0}}

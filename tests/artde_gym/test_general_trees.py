@@ -15,6 +15,8 @@ from artde_gym.multibody.mjcf import mjcf
 from artde_gym.multibody.spec import Link, RobotSpec
 from artde_gym.multibody.urdf import urdf
 
+pytestmark = pytest.mark.once
+
 mj: Any = mujoco
 SEEDS = range(6)
 TIGHT: Any = {"rtol": 0, "atol": 1e-9}

@@ -46,6 +46,7 @@ def test_a_sharp_step_lies_between_its_levels() -> None:
     assert half_point(steps([36.0] * 20), GRID) == (37.0, 36.0, 38.0, 20)
 
 
+@pytest.mark.once
 def test_the_interval_covers_the_true_half_point() -> None:
     """Edges scatter about 41 with a standard deviation of 4: about 95 % of the intervals contain 41."""
     rng = np.random.default_rng(0)
@@ -168,6 +169,7 @@ def test_who_survives_more_needs_all_of_them() -> None:
 # ---------------------------------------------------------------- the real thing
 
 
+@pytest.mark.once
 def test_rates_of_a_grid_are_those_of_its_episodes(tmp_path: Path) -> None:
     """Payloads that four rotors lift, hardly lift, and do not lift; counted by hand in the table of episodes."""
     grid: dict[str, Any] = {"low": 1.0, "high": 2.0, "tolerance": 0.25, "episodes": 6, "seed": 3, "grid": True}
@@ -222,6 +224,7 @@ def test_an_interrupted_grid_goes_on(vary: str, tmp_path: Path) -> None:
     pd.testing.assert_frame_equal(whole.levels, frontier(names, env_id, vary, **options).levels)
 
 
+@pytest.mark.once
 def test_levels_side_by_side_are_each_level_alone() -> None:
     """To the bit: nothing of an episode depends on what runs beside it."""
     kwargs: dict[str, Any] = {"duration": 2.6, "control_period": 0.004}
@@ -254,6 +257,7 @@ def test_disturbances_of_a_vector_are_a_mapping_or_one_for_each(wrong: Any) -> N
         env.reset(seed=0, options={"disturbances": wrong})
 
 
+@pytest.mark.once
 def test_grid_of_the_ground_force_is_the_thesis_force_in_a_scenario() -> None:
     for name, payload in (("S1", False), ("S2", True)):
         disturbances, arguments = standard_test(PUSH, "grf_pulse.magnitude", {}, name)

@@ -9,6 +9,8 @@ from scipy.interpolate import CubicSpline
 from artde_gym.errors import OptionError
 from artde_gym.robots.q450.infinity import LOOPS, RAMP, START, infinity_path
 
+pytestmark = pytest.mark.once
+
 PERIOD = 0.002
 
 

@@ -13,6 +13,8 @@ from artde_gym.disturbances.effects import Effects
 from artde_gym.errors import DisturbanceError
 from artde_gym.sim.engine import State
 
+pytestmark = pytest.mark.once
+
 ARM, WALK = "ArmTrack-Payload-v0", "BipedWalk-Payload-v0"
 CURVE: dict[str, Any] = {"viscous": 0.7, "coulomb": 2.0, "stribeck": 1.5, "stribeck_velocity": 0.2, "slip": 0.01}
 RUBBED: dict[str, Any] = {"coulomb": {"uniform": [0.5, 1.0]}, "stribeck": 0.4, "viscous": {"uniform": [0.0, 0.3]}}

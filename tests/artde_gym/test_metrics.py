@@ -17,6 +17,8 @@ from artde_gym.metrics_spec import MetricsSpec
 from artde_gym.robots.ojas import task as biped_task
 from artde_gym.robots.q450 import task as quadrotor_task
 
+pytestmark = pytest.mark.once
+
 Signals = dict[str, np.ndarray]
 BIPED = biped_task.METRICS_SPEC, biped_task.OBSERVATION
 QUADROTOR = quadrotor_task.METRICS_SPEC, quadrotor_task.OBSERVATION

@@ -87,6 +87,7 @@ def test_a_motion_comes_back_from_traces():
     assert Motion.read({"time": np.zeros(3)}) is None
 
 
+@pytest.mark.once
 def test_a_long_motion_is_thinned_for_a_page():
     poses = [Pose((0.0, 0.0, i / 1e4), (0.0, 0.0, 0.0, 1.0)) for i in range(2 * SHOWN + 1)]
     motion = Motion.of(poses, 0.01).thinned()
@@ -95,6 +96,7 @@ def test_a_long_motion_is_thinned_for_a_page():
     np.testing.assert_allclose(motion.base[:, 2], 3e-4 * np.arange(len(motion.base)), atol=1e-9)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(("scenario", "control_period"), [("S2", 0.004), ("Q1", 0.015)])
 def test_traces_hold_what_the_engine_says(tmp_path, engine_name, scenario, control_period):
     kwargs = {"duration": 0.3, "engine": engine_name, "control_period": control_period}
@@ -255,6 +257,7 @@ def test_a_page_is_small_and_asks_for_nothing():
     assert "three.js authors, MIT license" in text
 
 
+@pytest.mark.once
 def test_a_minute_of_walking_is_small():
     kwargs = {"engine": "mujoco", "duration": 9.0}
     shown = artde_gym.replay(["artde"], scenario="S1-L4", env_kwargs=kwargs)
@@ -275,6 +278,7 @@ def test_every_robot_has_a_scene_and_a_spec_needs_none(monkeypatch):
     assert all(body.parent is None or body.parent < i for i, body in enumerate(bare.bodies))
 
 
+@pytest.mark.once
 def test_footholds_are_where_the_feet_land():
     scene = scene_of("ojas", {"speed": 0.1, "step_duration": 1.0, "duration": 6.0})
     xs = sorted(x for x, y in scene.footholds if y > 0)

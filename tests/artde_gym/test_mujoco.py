@@ -18,6 +18,8 @@ from artde_gym.multibody.spec import RobotSpec, box_link
 from artde_gym.robots.ojas.model import ojas
 from artde_gym.sim.mujoco import MujocoEngine, mj
 
+pytestmark = pytest.mark.once
+
 SPECS = {
     f"{kind}-{arms}": ojas(kind, arms=arms) for kind in ("rotor", "lumped", "none") for arms in ("fixed", "revolute")
 }

@@ -152,6 +152,7 @@ def test_standard_designs_are_whole(robot):
     assert {name for claim in found.claims for name in claim.controllers} <= set(found.labels)
 
 
+@pytest.mark.once
 def test_a_sample_fills_each_factor_evenly_and_the_first_worlds_stay():
     factors = [
         Factor.of("flat", {"path": "gains", "uniform": [2.0, 4.0], "source": "a"}),
@@ -173,6 +174,7 @@ def test_a_sample_fills_each_factor_evenly_and_the_first_worlds_stay():
     assert sample(factors, 37, seed=6) != worlds[:37]
 
 
+@pytest.mark.once
 def test_worlds_side_by_side_are_those_of_evaluate_one_at_a_time(biped, quadrotor):
     """Each row is what its printed command gives, in the batch and (for the biped) in the single environment."""
     for found in (biped, quadrotor):
@@ -187,6 +189,7 @@ def test_worlds_side_by_side_are_those_of_evaluate_one_at_a_time(biped, quadroto
                     same_episode(episode(found, world, name), other)
 
 
+@pytest.mark.once
 def test_worlds_of_a_batch_are_those_of_single_environments(biped):
     line = biped.command(1, ("artde",))[0].replace(" --vectorized", "")
     same_episode(episode(biped, 1, "artde"), run_again(line).iloc[0])
@@ -235,6 +238,7 @@ def same_episode(row: Any, other: Any) -> None:
         assert mine == theirs or (pd.isna(mine) and pd.isna(theirs)), name
 
 
+@pytest.mark.once
 def test_the_second_pass_has_the_mean_gain_of_the_same_world(biped, quadrotor):
     for found, gains in ((biped, {""}), (quadrotor, {"_p", "_q"})):
         table = found.episodes.set_index(["world", "controller"])
@@ -251,6 +255,7 @@ def test_the_second_pass_keeps_the_gains_that_are_given_to_it():
     assert point.gains == {"m_bar": 0.08, "c": 0.3}
 
 
+@pytest.mark.once
 def test_results_depend_neither_on_workers_nor_on_the_order_of_runs(biped, tmp_path):
     fewer = multiverse({**BIPED, "worlds": 2}, tmp_path)
     assert len(fewer.episodes) == 6
@@ -352,6 +357,7 @@ def test_a_world_counts_once_all_of_its_controllers_have_run():
     assert table.worlds == [0, 1]
 
 
+@pytest.mark.once
 def test_the_factor_that_decides_is_found():
     pytest.importorskip("sklearn", reason="scikit-learn is not installed (extra multiverse)")
     rng = np.random.default_rng(0)
@@ -402,6 +408,7 @@ def test_the_record_says_that_nobody_asked_for_the_engine(quadrotor):
     assert quadrotor.provenance["engines"] == {"numpy": "default"}
 
 
+@pytest.mark.once
 def test_rank_correlations_find_a_monotone_factor():
     rng = np.random.default_rng(1)
     factors = rng.uniform(size=(300, 2))
@@ -419,6 +426,7 @@ def test_a_report_shows_every_claim_and_a_command(biped):
     assert "(nan" not in text
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(
     ("env_id", "suffixes"),
     [("ArmTrack-Payload-v0", ("",)), ("BipedWalk-Payload-v0", ("",)), ("QuadInfinity-Payload-v0", ("_p", "_q"))],

@@ -123,6 +123,7 @@ def test_what_is_fitted_says_so_wherever_it_appears() -> None:
     assert not any("fitted" in claim.text for claim in CLAIMS if not claim.scenario.endswith("GRF45"))
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("law", ["tde", "atde", "artde", "tde+c", "tde+kd"])
 def test_the_stiff_preset_keeps_its_margin(law: str) -> None:
     """15 % below the limit along the walk, so that it stays valid where all inertias are 15 % smaller."""
@@ -139,6 +140,7 @@ def test_the_stiff_preset_is_a_controller() -> None:
     assert controllers.make("pid", env, preset="stiff").gains == controllers.make("pid", env, m_bar=0.077).gains
 
 
+@pytest.mark.once
 def test_reproduce_runs_the_grids_behind_claims(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     kit = ROBOTS["ojas"]
     assert kit.frontier is not None

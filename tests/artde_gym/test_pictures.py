@@ -20,6 +20,8 @@ from artde_gym.sim.factory import EngineName, make_engine
 from artde_gym.sim.ground import SUN, Shadow
 from artde_gym.sim.rotation import matrix
 
+pytestmark = pytest.mark.once
+
 WALK, FLIGHT = "BipedWalk-Payload-v0", "QuadInfinity-Payload-v0"
 KICK = {"body": "chest", "magnitude": 30.0, "direction": [1.0, 0.0, 0.0], "start": 0.2, "duration": 0.1}
 

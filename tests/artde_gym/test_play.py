@@ -68,6 +68,7 @@ def test_sliders_show_the_gains_that_act(given):
     assert {gain: player.sliders()[gain][-1] for gain in acting} == acting
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(("size", "falls"), [(5.0, False), (45.0, True)])
 def test_a_push_topples_or_not_and_evaluate_repeats_it(tmp_path, size, falls):
     game = walking()
@@ -85,6 +86,7 @@ def test_a_push_topples_or_not_and_evaluate_repeats_it(tmp_path, size, falls):
     assert row["duration_s"] == game.players[0].end
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("env", ["QuadInfinity-Payload-v0", "QuadSling-Payload-v0"])
 def test_all_that_was_done_can_be_done_again(env):
     given = {**LOADED, "payload": {**LOADED["payload"], "cable": 0.4}} if "Sling" in env else LOADED
@@ -117,6 +119,7 @@ LEAVES: dict[str, Any] = {
 }
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("leaves", LEAVES)
 def test_a_drop_in_place_of_a_sampled_one_leaves_all_other_samples(leaves):
     payload = {"mass": {"uniform": [0.3, 0.4]}, "detach_time": LEAVES[leaves]}
@@ -129,6 +132,7 @@ def test_a_drop_in_place_of_a_sampled_one_leaves_all_other_samples(leaves):
     assert again(game, ["artde"]).frame() == game.frame()
 
 
+@pytest.mark.once
 def test_an_attached_payload_in_place_of_a_sampled_one_leaves_all_other_samples():
     payload = {"mass": {"normal": [0.3, 0.01]}, "position": [0.0, {"uniform": [0.0, 0.01]}, -0.1], "detach_time": 0.0}
     game = flying(given={"payload": payload, "wind": {"ambient": {"uniform": [0.5, 2.0]}}})
@@ -139,6 +143,7 @@ def test_an_attached_payload_in_place_of_a_sampled_one_leaves_all_other_samples(
     assert again(game, ["artde"]).frame() == game.frame()
 
 
+@pytest.mark.once
 def test_a_payload_comes_and_goes():
     game = flying(given={})
     assert told(game)["payload"] == "none"
@@ -158,6 +163,7 @@ def test_a_payload_comes_and_goes():
     assert told(game)["payload"] == "none"
 
 
+@pytest.mark.once
 def test_a_payload_is_attached_to_a_walking_robot():
     game = walking()
     order(game, do="payload", on=False)

@@ -81,10 +81,12 @@ def test_every_module_but_bullets_own_imports_without_it() -> None:
     assert failed.keys() == {"artde_gym.sim.bullet", "artde_gym.sim.pybullet_module"}
 
 
+@pytest.mark.once
 def test_no_module_needs_what_posix_alone_has() -> None:
     assert "nothing" in run(f"{HIDE_POSIX}{ALL_MODULES}{BUT_BULLET}print(failed or 'nothing')")
 
 
+@pytest.mark.once
 def test_an_evaluation_needs_nothing_of_posix(tmp_path: Path) -> None:
     call = ["evaluate", "--engine", "mujoco", "--env-kwargs", json.dumps(SHORT), "--out", str(tmp_path / "run"),
             "--episodes", "1", "--workers", "1", "--scenario", "S1", "--report"]  # fmt: skip

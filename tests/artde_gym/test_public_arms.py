@@ -23,6 +23,8 @@ from artde_gym.robots.arm.panda import panda
 from artde_gym.robots.arm.reader import read_arm
 from controllers.workspace_design import advice, workspace_design
 
+pytestmark = pytest.mark.once
+
 try:
     import pinocchio
 except ImportError:

@@ -144,6 +144,7 @@ def test_nothing_jumps_at_the_start() -> None:
     assert np.abs(after["body_rates"]).max() < 2e-3
 
 
+@pytest.mark.once
 def test_the_whole_flight(pilot: Pilot) -> None:
     """Two loops and the drop under an independent controller: references, times, bounds, events, truncation."""
     env = make()

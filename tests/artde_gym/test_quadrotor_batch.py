@@ -76,6 +76,7 @@ def flown(env: Any, pilot: Pilot, seed: Any, steps: int) -> list[tuple[bytes, ..
 # ----------------------------------------------------------------------------------------------------- each as if alone
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("kwargs", [{}, {"dtype": "float32"}, {"measurement": "mocap", "control_period": 0.01}])
 def test_batch_is_loop_to_the_bit(kwargs: dict[str, Any], pilot: Pilot, monkeypatch: pytest.MonkeyPatch) -> None:
     seeds, steps = [11, 5, 7, 3, 2, 13, 17], 60
@@ -87,6 +88,7 @@ def test_batch_is_loop_to_the_bit(kwargs: dict[str, Any], pilot: Pilot, monkeypa
     assert flown(make(7, **arguments), pilot, seeds, steps) == loop
 
 
+@pytest.mark.once
 def test_another_size_of_arrays_is_the_same_to_the_bit(pilot: Pilot) -> None:
     """Vector instructions treat the end of an array differently: sizes around their width."""
     few, many = make(5, disturbances=VARIED), make(133, disturbances=VARIED)
@@ -122,6 +124,7 @@ def test_generators_go_on_without_a_seed_as_those_of_one_environment() -> None:
     assert again[0] not in (first[0], second[0])
 
 
+@pytest.mark.once
 def test_float32_flies_nearly_the_same(pilot: Pilot) -> None:
     double, half = make(4, disturbances=VARIED), make(4, disturbances=VARIED, dtype="float32")
     a, b = double.reset(seed=0)[0], half.reset(seed=0)[0]
@@ -185,6 +188,7 @@ def test_spec_survives_json() -> None:
     assert first == second
 
 
+@pytest.mark.once
 def test_same_seed_same_bits_after_other_flights(pilot: Pilot) -> None:
     env = make(3, disturbances=VARIED, duration=0.4)
     first = flown(env, pilot, 1, 40)
@@ -223,6 +227,7 @@ def test_autoreset_is_that_of_gymnasiums_own_vector(pilot: Pilot) -> None:
     theirs.close()
 
 
+@pytest.mark.once
 def test_others_do_not_notice_a_crash(pilot: Pilot) -> None:
     calm, crashing = make(3), make(3)
     a, b = calm.reset(seed=0)[0], crashing.reset(seed=0)[0]
@@ -330,6 +335,7 @@ def test_bad_resets_and_steps() -> None:
     assert env.step(hover)[0].tobytes() == other.step(hover)[0].tobytes()  # refusals change nothing
 
 
+@pytest.mark.once
 def test_two_vectors_in_one_process_do_not_touch_each_other(pilot: Pilot) -> None:
     alone = flown(make(2, disturbances=VARIED), pilot, 3, 20)
     env, disturber = make(2, disturbances=VARIED), make(5, disturbances={}, control_period=0.03)

@@ -22,6 +22,8 @@ from artde_gym.sim.rigid_bodies import (
 )
 from artde_gym.sim.rotation import matrix
 
+pytestmark = pytest.mark.once
+
 G = 9.81
 BARE = MassProperties(MASS, (0.0, 0.0, 0.0), np.diag(INERTIA))
 BALL = MassProperties(0.35, PAYLOAD_PLACE, 0.4 * 0.35 * 0.08**2 * np.eye(3))

@@ -21,6 +21,8 @@ from artde_gym.robots.ojas.walking import walking_pattern
 from artde_gym.sim.factory import make_engine
 from controllers.laws.stability import tde_eigenvalues, tde_is_valid
 
+pytestmark = pytest.mark.once
+
 SPECS = {
     f"{kind}-{arms}": ojas(kind, arms=arms) for kind in ("rotor", "lumped", "none") for arms in ("fixed", "revolute")
 }

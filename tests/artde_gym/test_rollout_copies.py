@@ -73,6 +73,7 @@ def test_one_episode(env_id: str) -> None:
     env.close()
 
 
+@pytest.mark.once
 def test_many_episodes() -> None:
     env = vector(QUADROTOR, json.dumps(SHORT), 3)
     policy = controllers.make("artde", env)

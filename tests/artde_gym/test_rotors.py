@@ -12,6 +12,8 @@ from artde_gym.multibody.lag import lag_shares
 from artde_gym.robots.q450 import model as q450
 from artde_gym.robots.q450.rotors import Rotors
 
+pytestmark = pytest.mark.once
+
 STEP = 0.001
 STEPS = 15
 HOVER = [3.6, 3.7, 3.8, 3.5]

@@ -7,6 +7,8 @@ import pytest
 from artde_gym.robots.ojas.model import ojas
 from artde_gym.sim.factory import make_engine
 
+pytestmark = pytest.mark.once
+
 
 @pytest.mark.parametrize("engine", ["bullet", "mujoco"])
 def test_feet_stop_each_other_only_if_the_spec_says_so(engine):

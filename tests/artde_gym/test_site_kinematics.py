@@ -12,6 +12,8 @@ from artde_gym.robots.ojas.model import ojas
 from artde_gym.sim.mujoco_batch import MujocoBatch
 from artde_gym.sim.mujoco_kinematics import COPIES
 
+pytestmark = pytest.mark.once
+
 
 @pytest.mark.parametrize("spec", [panda(), ojas()], ids=["fixed", "floating"])
 @pytest.mark.parametrize("n", [1, COPIES, COPIES + 3])

@@ -17,6 +17,8 @@ from artde_gym.sim.factory import EngineName
 from artde_gym.studies.frontier.axis import axis
 from artde_gym.studies.frontier.standard import standard_for
 
+pytestmark = pytest.mark.once
+
 ID = "QuadSling-Payload-v0"
 LAYOUT = sling.OBSERVATION
 HELD: dict[str, Any] = {"payload": {"mass": 0.35, "cable": 0.6}}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import subprocess
 import sys
@@ -20,10 +21,11 @@ PACKAGES = "import sys, json; names = {name.partition('.')[0] for name in sys.mo
 PACKAGES += "print(json.dumps(sorted(name for name in names if not name.startswith('_'))), file=sys.stderr)"
 
 
-def packages(code: str) -> set[str]:
+@functools.cache
+def packages(code: str) -> frozenset[str]:
     """Return the packages that a new process imports while it runs some code, without the standard library."""
     found = subprocess.run([sys.executable, "-c", f"{code}\n{PACKAGES}"], capture_output=True, text=True, check=True)
-    return set(json.loads(found.stderr.splitlines()[-1]))
+    return frozenset(json.loads(found.stderr.splitlines()[-1]))
 
 
 def run(setup: str, arguments: list[str]) -> str:

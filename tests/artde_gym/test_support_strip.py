@@ -6,6 +6,7 @@ import dataclasses
 import re
 
 import numpy as np
+import pytest
 
 from artde_gym.palette import Style
 from artde_gym.report.chart import LEFT, RIGHT, Axis, Chart
@@ -13,6 +14,8 @@ from artde_gym.report.run import Episode, Signals
 from artde_gym.report.signals import over_time
 from artde_gym.robots.ojas.report import SUPPORT, reference, strip
 from artde_gym.robots.ojas.walking import walking_pattern
+
+pytestmark = pytest.mark.once
 
 TIME = np.linspace(0.0, 1.0, 101)
 

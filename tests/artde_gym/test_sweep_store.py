@@ -144,7 +144,9 @@ print(number - 1)
 """
 
 
-@pytest.mark.parametrize("kind", ["before", "after", "half"])
+@pytest.mark.parametrize(
+    "kind", ["before", *(pytest.param(kind, marks=pytest.mark.once) for kind in ("after", "half"))]
+)
 def test_killed_at_any_step_it_is_whole_and_goes_on(tmp_path, whole, kind):
     """SIGKILL before, after or in the middle of each call that changes the file system, one after the other."""
     arguments = [sys.executable, "-c", CRASHES, str(Path(__file__).parent), str(tmp_path), kind]

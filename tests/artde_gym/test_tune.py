@@ -49,6 +49,7 @@ def lift(tmp_path, monkeypatch):
     artde_gym.register_controller("lift", "lifting:Lift", tuning_space="lifting:tuning_space")
 
 
+@pytest.mark.once
 def test_finds_the_gain_that_flies_where_the_preset_falls(lift):
     found = tune(["lift"], QUADROTOR, trials=25, episodes=1, held_out=2, disturbances={}, env_kwargs={"duration": 1.5})
     assert found.metric == "rmse_m"
@@ -116,6 +117,7 @@ def test_an_interrupted_run_continues_as_if_nothing_had_happened(tmp_path):
         tune(names, QUADROTOR, out=broken, **{**SHORT, "trials": 4})
 
 
+@pytest.mark.once
 def test_a_controller_is_tuned_alike_in_any_company():
     together = tune(["tde", "pid"], QUADROTOR, **SHORT)
     alone = tune(["pid"], QUADROTOR, **SHORT)
@@ -124,6 +126,7 @@ def test_a_controller_is_tuned_alike_in_any_company():
     assert gains_of(other, "pid")[1:] != gains_of(alone, "pid")[1:]
 
 
+@pytest.mark.once
 def test_the_biped_is_tuned_too():
     kwargs = {"duration": 0.2, "actuator_inertia": "lumped", "control_period": 0.004}
     found = tune(["tde"], BIPED, **{**SHORT, "trials": 2, "env_kwargs": kwargs})

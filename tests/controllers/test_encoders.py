@@ -15,6 +15,8 @@ from controllers import GainError
 from controllers.laws.tracking import JointInput
 from controllers.laws.velocity_estimate import estimate, estimate_init
 
+pytestmark = pytest.mark.once
+
 PERIOD = 0.001
 
 

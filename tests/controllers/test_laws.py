@@ -35,6 +35,8 @@ from controllers.laws.tde import (
 )
 from controllers.laws.tracking import JointInput, sliding_variable, smooth_sign
 
+pytestmark = pytest.mark.once
+
 PERIOD = 0.004
 FEEDBACK: dict[str, dict[str, Any]] = {
     "scalar": {"m_bar": 0.042, "k_p": 25.0, "k_d": 10.0},

@@ -7,6 +7,8 @@ import pytest
 import controllers
 from artde_gym.robots.ojas.task import OBSERVATION
 
+pytestmark = pytest.mark.once
+
 M_BAR, K_P, K_D = 0.042, 25.0, 10.0
 DISTURBANCES = {
     "payload": {"mass": 1.3, "position": [0.01, -0.01, 0.16]},

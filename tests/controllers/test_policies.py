@@ -61,6 +61,7 @@ def leaves(memory: Any) -> list[np.ndarray]:
 # --------------------------------------------------------------------------------------------------------------- memory
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("name", POLICIES)
 def test_environments_with_their_own_starts_equal_separate_runs(env, name):
     policy = controllers.make(name, env)
@@ -80,6 +81,7 @@ def test_environments_with_their_own_starts_equal_separate_runs(env, name):
         np.testing.assert_array_equal(np.array(together)[:, i], alone)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("name", POLICIES)
 def test_all_memory_is_in_the_state(env, name):
     policy = controllers.make(name, env)
@@ -91,6 +93,7 @@ def test_all_memory_is_in_the_state(env, name):
     np.testing.assert_array_equal(policy.predict(second, state, np.array([True]))[0], policy.predict(second)[0])
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("name", POLICIES)
 def test_one_observation_equals_a_batch_of_one(env, name):
     policy = controllers.make(name, env)
@@ -102,6 +105,7 @@ def test_one_observation_equals_a_batch_of_one(env, name):
         np.testing.assert_array_equal(batch, single[None], strict=True)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("name", POLICIES)
 def test_float32_observations_give_float32_actions(env, name):
     policy = controllers.make(name, env)
@@ -280,6 +284,7 @@ def rollout(env: gym.Env, policy: Any, **options: Any) -> dict[str, np.ndarray]:
     return OBSERVATION.split(np.array(rows))
 
 
+@pytest.mark.once
 def test_computed_torque_walks_with_a_small_error():
     env = make_env(duration=6.0, disturbances={}, control_period=0.005)
     walk = rollout(env, controllers.make("computed-torque", env))

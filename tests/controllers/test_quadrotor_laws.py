@@ -22,6 +22,8 @@ from controllers.laws.tde import TdeGains
 from controllers.laws.tracking import Array, JointInput, Law, LawState, components
 from controllers.laws.vectors import joined, to_body, to_world
 
+pytestmark = pytest.mark.once
+
 PERIOD = 0.015
 THESIS: dict[str, Any] = {"k_p": 10.0, "k_d": 5.0}
 LIMITS: dict[str, Any] = {"command_rate": 30.0, "tilt_max_deg": 45.0, "lift_min": 2.0, "lift_max": 24.0}

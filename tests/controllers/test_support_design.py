@@ -22,6 +22,8 @@ from controllers.laws.stability import (
 )
 from controllers.support_design import design_supports
 
+pytestmark = pytest.mark.once
+
 RNG = np.random.default_rng(6)
 
 

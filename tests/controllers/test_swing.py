@@ -15,6 +15,8 @@ from artde_gym.robots.q450.sling import OBSERVATION
 from controllers.laws.errors import GainError
 from controllers.laws.swing import Cable, swing_gains, swing_term
 
+pytestmark = pytest.mark.once
+
 ID = "QuadSling-Payload-v0"
 SLUNG = ["tde+swing", "atde+swing", "artde+swing", "geometric-load"]
 

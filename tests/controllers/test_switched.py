@@ -25,6 +25,8 @@ from controllers.laws.switched import PHASES, SupportState, nominal_inertia, sup
 from controllers.laws.tracking import JointInput
 from controllers.policies import ControlInterface
 
+pytestmark = pytest.mark.once
+
 NAMES = ("tde-switched", "atde-switched", "artde-switched")
 ADAPTIVE = {"atde-switched": ("c",), "artde-switched": ("beta_0", "beta_1")}
 PERIOD = 0.004
@@ -235,7 +237,6 @@ LIES: dict[str, Callable[[], Callable[[np.ndarray], np.ndarray]]] = {
 }
 
 
-@pytest.mark.once
 @pytest.mark.parametrize("lie", LIES)
 def test_lying_contact_flags_do_not_topple_it(lie) -> None:
     """Two steps of S1 at 4 ms; `scripts/switching.py flags` walks 20 s."""

@@ -14,6 +14,8 @@ from controllers import GainError
 from controllers.laws.tde import TdeGains, tde, tde_init
 from controllers.laws.tracking import JointInput
 
+pytestmark = pytest.mark.once
+
 LAWS = ("tde", "atde", "artde", "pid", "tde+c", "tde+kd")
 
 

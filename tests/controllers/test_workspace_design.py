@@ -23,6 +23,8 @@ from controllers.laws.errors import GainError
 from controllers.mode import force_noise, spectral_radius
 from controllers.workspace_design import CHATTER, advice, workspace_design
 
+pytestmark = pytest.mark.once
+
 ID = "ArmTrack-Payload-v0"
 PERIOD = 0.001
 

@@ -1,4 +1,4 @@
-"""Short runs with their reports."""
+"""Short runs with their reports, which several modules read: who changes one changes a copy."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from artde_gym.studies.reproduce.claims import all_claims, judge
 SHORT = {"duration": 3.0, "actuator_inertia": "lumped"}
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def walks(tmp_path_factory):
     folder = tmp_path_factory.mktemp("walks") / "run"
     push = {"body": "chest", "magnitude": 60.0, "direction": [1.0, 0.0, 0.0], "start": 0.5, "duration": 0.2}
@@ -29,7 +29,7 @@ def walks(tmp_path_factory):
     return folder
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def flights(tmp_path_factory):
     folder = tmp_path_factory.mktemp("flights") / "run"
     disturbances = {"payload": {"mass": 0.35, "detach_time": 2.0}}
@@ -40,7 +40,7 @@ def flights(tmp_path_factory):
     return folder
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def bracket(tmp_path_factory):
     folder = tmp_path_factory.mktemp("frontier") / "run"
     arguments = {"low": 1.0, "high": 3.0, "tolerance": 1.0, "episodes": 1, "env_kwargs": {"duration": 2.0}}
@@ -49,7 +49,7 @@ def bracket(tmp_path_factory):
     return folder
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def training(tmp_path_factory):
     """As a training leaves it behind."""
     folder = tmp_path_factory.mktemp("training")

@@ -28,6 +28,8 @@ from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.laws import Laws
 from artde_gym.report.run import Run, nested
 
+pytestmark = pytest.mark.once
+
 
 class Reader(html.parser.HTMLParser):
     """Tags with their attributes, in order."""
@@ -203,12 +205,14 @@ def test_a_folder_of_something_else_is_refused_in_one_line(tmp_path):
             write_report(folder)
 
 
-def test_command(flights):
-    (flights / "report.html").unlink()
-    answer = CliRunner().invoke(app, ["report", str(flights)])
+def test_command(flights, tmp_path):
+    folder = tmp_path / "run"
+    shutil.copytree(flights, folder)
+    (folder / "report.html").unlink()
+    answer = CliRunner().invoke(app, ["report", str(folder)])
     assert answer.exit_code == 0
     assert "report.html" in answer.output
-    assert (flights / "report.html").exists()
+    assert (folder / "report.html").exists()
 
 
 @pytest.fixture(scope="module")
