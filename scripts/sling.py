@@ -93,9 +93,8 @@ def flights(
     kinds = [label for label in labels for _ in range(len(cells) * seeds)]
     numbers = [episode_seed(seed, number) for number in range(seeds)] * (len(cells) * len(labels))
     options = {"disturbances": disturbances}
-    return pd.DataFrame(
-        [episode.row for episode in run_vector(env, SideBySide(policies, kinds), numbers, options=options)]
-    )
+    together = SideBySide(policies, kinds, env.action_layout.size)
+    return pd.DataFrame([episode.row for episode in run_vector(env, together, numbers, options=options)])
 
 
 def policy_of(label: str, env: Any, mass: float) -> Any:

@@ -29,7 +29,7 @@ from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.evaluation.side_by_side import SideBySide
 from artde_gym.evaluation.vector_rollout import run_vector
 from artde_gym.files import write_atomically
-from artde_gym.robots.ojas.task import OBSERVATION
+from artde_gym.robots.ojas.task import ACTION, OBSERVATION
 from artde_gym.scenarios import SCENARIOS
 from controllers.drive import DRIVES
 
@@ -119,7 +119,8 @@ def walks(
                         duration=DURATION, autoreset_mode="Disabled", **kwargs)  # fmt: skip
     env = Landings(made.unwrapped, change)
     policies = {law: controllers.make(LAWS[law][0], env.unwrapped, **LAWS[law][1]) for law in {row[0] for row in rows}}
-    together = SideBySide([policies[row[0]] for row in rows], [row[0] for row in rows])
+    laws = [row[0] for row in rows]
+    together = SideBySide([policies[law] for law in laws], laws, ACTION.size)
     seeds = [episode_seed(SEED, row[2]) for row in rows]
     episodes = run_vector(env, together, seeds, options={"disturbances": [row[1] for row in rows]})
     found: list[dict[str, Any]] = []

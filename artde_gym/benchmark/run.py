@@ -15,6 +15,7 @@ SECTIONS: dict[str, str] = {
     "flight": "artde_gym.benchmark.flight:flying",
     "fleet": "artde_gym.benchmark.flight:fleets",
     "biped-vector": "artde_gym.benchmark.biped_vector:biped_vector",
+    "evaluation": "artde_gym.benchmark.evaluation:evaluating",
     "reset": "artde_gym.benchmark.reset:resetting",
     "controllers": "artde_gym.benchmark.calls:calling",
     "scaling": "artde_gym.benchmark.scaling:scaling",

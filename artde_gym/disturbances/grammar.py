@@ -80,12 +80,13 @@ class Disturbances:
         """Return sampled values in the same grammar, which `Disturbances.parse` reads."""
         sampled: dict[str, Any] = {}
         for name, entry in self.entries:
+            kind = DISTURBANCES[name]
             values = {
                 parameter.name: _draw(entry[parameter.name], parameter, rng)
-                for parameter in DISTURBANCES[name].parameters
+                for parameter in kind.parameters
                 if parameter.name in entry
             }
-            if DISTURBANCES[name].multiple:
+            if kind.multiple:
                 sampled.setdefault(name, []).append(values)
             else:
                 sampled[name] = values
@@ -235,10 +236,17 @@ def _check_distribution(kind: str, arguments: Any, parameter: Parameter, field: 
     return [first, float(deviation)]
 
 
+def duplicate(sampled: Any) -> Any:
+    """Copy sampled values, dictionaries and lists of numbers and words, faster than `copy.deepcopy`."""
+    if isinstance(sampled, dict):
+        return {name: duplicate(value) for name, value in sampled.items()}
+    return [duplicate(value) for value in sampled] if isinstance(sampled, list) else sampled
+
+
 def _draw(value: Any, parameter: Parameter, rng: np.random.Generator) -> Any:
     if isinstance(value, list):
         for _ in range(NORMAL_DRAWS):
-            drawn = [_draw(item, parameter, rng) for item in value]
+            drawn = [_draw(item, parameter, rng) if isinstance(item, dict) else item for item in value]
             if any(drawn) or not parameter.nonzero:
                 return drawn
         return [1.0, *[0.0] * (parameter.size - 1)]  # a nonzero vector has next to no chance

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from artde_gym.disturbances.grammar import duplicate
 from artde_gym.disturbances.numeric import numeric
 from artde_gym.disturbances.schedule import Push, Schedule
 from artde_gym.envs.disturbed import DisturbedMixin
@@ -74,7 +75,7 @@ class InteractiveMixin(DisturbedMixin, abc.ABC):
     @property
     def sampled_disturbances(self) -> dict[str, Any]:
         """The disturbances of this episode in the grammar of `artde_gym.disturbances`, which `reset` accepts."""
-        return copy.deepcopy(dict(self._sampled))
+        return duplicate(self._sampled)
 
     def _sample(self, sampled: Mapping[str, Any]) -> None:
         self._sampled = sampled

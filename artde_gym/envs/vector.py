@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from artde_gym.arguments import check_seed, real_array
 from artde_gym.arrays import Array
 from artde_gym.disturbances import Disturbances
+from artde_gym.disturbances.grammar import duplicate
 from artde_gym.disturbances.numeric import numeric_rows
 from artde_gym.disturbances.schedule import EVENTS
 from artde_gym.envs.closed_env import require_open
@@ -139,7 +140,7 @@ class BaseVectorEnv(DisturbedMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
     @property
     def sampled_disturbances(self) -> list[dict[str, Any]]:
         """The disturbances of each episode in the grammar of `artde_gym.disturbances`."""
-        return [copy.deepcopy(dict(sampled)) for sampled in self._sampled]
+        return [duplicate(sampled) for sampled in self._sampled]
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
         """Return an attribute, once for each environment."""

@@ -54,8 +54,9 @@ def evaluate(
         disturbances: override those of the scenario or the environment.
         env_kwargs: environment arguments, added to the scenario's.
         gains: controller name -> gains that override its preset's.
-        vectorized: whether to run up to `CHUNK` episodes at once in a vector environment, if the environment has one.
-            Both ways draw the same disturbances from a seed.
+        vectorized: whether to run many episodes at once in a vector environment, if the environment has one: those of
+            all controllers in a scenario, up to about `CHUNK`, each as if it were alone. Both ways draw the same
+            disturbances from a seed.
         record_episodes: number of episodes per controller and scenario whose signals are stored in the folder; None
             for all, or for none if `vectorized`.
         record_hz: rate of stored signals; infinite for every sample.

@@ -45,7 +45,7 @@ class Plan:
             `vectorized`.
         record_hz: rate of stored signals; infinite for all of them.
         allow_mixed: whether results of other software may be continued.
-        together: whether cells that differ by disturbances alone run side by side in one vector.
+        together: whether cells that differ by disturbances alone share a vector, as controllers in one cell always do.
     """
 
     controllers: Mapping[str, Policy | ControllerSpec]
@@ -165,4 +165,6 @@ class Plan:
             for cell, (name, item) in itertools.product(self.cells, self.controllers.items())
         ]
         shown: dict[str, Any] = {"record_episodes": self.traces, "record_hz": self.record_hz}
-        return tasks_of(cases, self.episodes, self.vectorized, done, **shown, together=self.together)
+        return tasks_of(
+            cases, self.episodes, self.vectorized, done, **shown, together=self.together, workers=self.workers
+        )

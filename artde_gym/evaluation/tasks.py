@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Collection, Iterable, Iterator
+import math
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 from artde_gym.evaluation.cells import Cell, shared_kwargs, single_of, vector_of
@@ -11,15 +12,17 @@ from artde_gym.evaluation.gains import policy_for
 from artde_gym.evaluation.registered import METRICS, require_metrics
 from artde_gym.evaluation.rollout import Episode, Policy, run_episode
 from artde_gym.evaluation.seeds import episode_seed
+from artde_gym.evaluation.side_by_side import SideBySide
 from artde_gym.evaluation.vector_rollout import run_vector
 from artde_gym.registration import ControllerSpec
 
 CHUNK = 2500
-"""Most episodes that run at once in a vector environment: no result depends on it, and more is hardly faster."""
-
+"""Most episodes of a controller that run at once in a vector environment, and about as many of several controllers: no
+result depends on it, and more is hardly faster."""
 
 SIDE_BY_SIDE = 128
-"""As `CHUNK`, of cells that run side by side: more would be little faster, and an interruption loses what runs."""
+"""As `CHUNK`, of a controller in cells that run side by side: more would be little faster, and an interruption loses
+what runs."""
 
 
 class Case(NamedTuple):
@@ -32,24 +35,39 @@ class Case(NamedTuple):
     seed: int
 
 
-class Task(NamedTuple):
-    """Episodes of one controller that run at once: one, or a chunk. The first `record_episodes` leave traces.
+Run = tuple[Case, int]
+"""A case, and the number of one of its episodes."""
 
-    `cells` are those of the episodes, which differ from `cell` by name and disturbances alone. `metrics` are the
-    registered ones that the process must know.
+
+class Task(NamedTuple):
+    """Episodes that run at once: one, or some of controllers that share a vector environment.
+
+    `cases` are those of the episodes; their cells differ by name and disturbances alone. The first `record_episodes` of
+    each case leave traces. `metrics` are the registered ones that the process must know.
     """
 
     vectorized: bool
-    cell: Cell
-    controller: str
-    policy: Policy | ControllerSpec
-    gains: dict[str, Any]
+    cases: tuple[Case, ...]
     episodes: list[int]
     seeds: list[int]
     record_hz: float
     record_episodes: int
-    cells: tuple[Cell, ...]
     metrics: tuple[str, ...] = ()
+
+    @property
+    def cell(self) -> Cell:
+        """The cell of the first episode."""
+        return self.cases[0].cell
+
+    @property
+    def cells(self) -> list[Cell]:
+        """The cell of each episode."""
+        return [case.cell for case in self.cases]
+
+    @property
+    def controller(self) -> str:
+        """The controllers, separated by commas."""
+        return ", ".join(dict.fromkeys(case.controller for case in self.cases))
 
 
 class Update(NamedTuple):
@@ -98,8 +116,13 @@ def tasks_of(
     record_episodes: int = 0,
     record_hz: float = 100.0,
     together: bool = False,
+    workers: int = 1,
 ) -> Iterator[Task]:
     """Yield tasks for the episodes of all cases, chunk by chunk, so that an interruption leaves whole comparisons.
+
+    In vector environments, controllers in one cell run at once, fewer of them in a task if there would be no task for
+    each worker. The number of workers never divides a controller's own episodes: a network's last bits may depend on
+    how many observations it gets.
 
     Args:
         cases: the cases to run; no two share both the cell's name and the controller.
@@ -108,31 +131,43 @@ def tasks_of(
         done: cell's name, controller and number of the episodes to leave out.
         record_episodes: the first so many episodes of each case leave traces.
         record_hz: rate of the traces.
-        together: whether cases of one controller, whose cells differ by disturbances alone, run at once in a vector.
+        together: whether cells that differ by disturbances alone run at once, too.
+        workers: number of processes that share the tasks.
     """
-    groups = _groups(cases) if together and vectorized else [[case] for case in cases]
-    largest = max(map(len, groups), default=1)
+    groups = _groups(cases, together) if vectorized else [[[case]] for case in cases]
+    largest = max((len(own) for group in groups for own in group), default=1)
     size = 1 if not vectorized else max(1, SIDE_BY_SIDE // largest) if largest > 1 else CHUNK
-    for chunk in chunks_of(episodes, size):
+    chunks = chunks_of(episodes, size)
+    least = workers // math.gcd(workers, len(chunks) * len(groups))  # so that all workers end at about the same time
+    for chunk in chunks:
         for group in groups:
             left = [
-                (case, episode)
-                for case, episode in itertools.product(group, chunk)
-                if (case.cell.name, case.controller, episode) not in done
+                [
+                    run
+                    for run in itertools.product(own, chunk)
+                    if (run[0].cell.name, run[0].controller, run[1]) not in done
+                ]
+                for own in group
             ]
-            if left:
-                left.sort(key=lambda run: run[1] >= record_episodes)  # a vector leaves traces of its first ones
-                yield _task(left, vectorized, record_episodes, record_hz)
+            for some in _portions([runs for runs in left if runs], least):
+                yield _task(some, vectorized, record_episodes, record_hz)
 
 
-def _groups(cases: Collection[Case]) -> list[list[Case]]:
-    """Put cases together that one vector and one policy can run."""
-    groups: dict[str, list[Case]] = {}
+def _groups(cases: Collection[Case], together: bool) -> list[list[list[Case]]]:
+    """Put cases together that one vector can run, those of each controller in a list."""
+    groups: dict[str, dict[str, list[Case]]] = {}
     for case in cases:
         cell = case.cell
-        key = (case.controller, case.seed, cell.env_id, shared_kwargs(cell), cell.phases, case.gains)
-        groups.setdefault(repr(key), []).append(case)
-    return list(groups.values())
+        key = (case.seed, cell.env_id, shared_kwargs(cell), cell.phases, None if together else cell.name)
+        groups.setdefault(repr(key), {}).setdefault(repr((case.controller, case.gains)), []).append(case)
+    return [list(group.values()) for group in groups.values()]
+
+
+def _portions(controllers: Sequence[Sequence[Run]], least: int) -> Iterator[list[Run]]:
+    """Divide the runs of some controllers between these into portions, at least so many if there are as many."""
+    count = max(least, -(-sum(map(len, controllers)) // CHUNK))
+    for some in chunks_of(len(controllers), -(-len(controllers) // count)) if controllers else ():
+        yield [run for i in some for run in controllers[i]]
 
 
 def task_of(
@@ -142,12 +177,10 @@ def task_of(
     return _task([(case, episode) for episode in episodes], vectorized, record_episodes, record_hz)
 
 
-def _task(runs: list[tuple[Case, int]], vectorized: bool, record_episodes: int, record_hz: float) -> Task:
-    case, numbers = runs[0][0], [episode for _, episode in runs]
-    seeds = [episode_seed(one.seed, episode) for one, episode in runs]
-    shown, cells = sum(episode < record_episodes for episode in numbers), tuple(one.cell for one, _ in runs)
-    who = (case.cell, case.controller, case.policy, case.gains)
-    return Task(vectorized, *who, numbers, seeds, record_hz, shown, cells, tuple(METRICS))
+def _task(runs: Sequence[Run], vectorized: bool, record_episodes: int, record_hz: float) -> Task:
+    cases, numbers = zip(*runs, strict=True)
+    seeds = [episode_seed(case.seed, episode) for case, episode in runs]
+    return Task(vectorized, cases, list(numbers), seeds, record_hz, record_episodes, tuple(METRICS))
 
 
 def chunks_of(episodes: int, size: int) -> list[range]:
@@ -160,25 +193,39 @@ def chunks_of(episodes: int, size: int) -> list[range]:
 def run_task(task: Task, on_progress: Callable[[float], None]) -> list[Episode]:
     """Run the episodes of a task; `on_progress` is called with the simulated time (s)."""
     require_metrics(task.metrics)
+    recorded = {i for i, episode in enumerate(task.episodes) if episode < task.record_episodes}
     options: dict[str, Any] = {"record_hz": task.record_hz, "phases": task.cell.phases, "on_progress": on_progress}
     if task.vectorized:
         env, reset_options = vector_of(task.cells)
-        policy = policy_for(task.policy, env, task.gains)
-        return run_vector(
-            env, policy, task.seeds, options=reset_options, record_episodes=task.record_episodes, **options
-        )
+        policies = _policies(task.cases, env)
+        return run_vector(env, policies, task.seeds, options=reset_options, recorded=recorded, **options)
     env, reset_options = single_of(task.cell)
-    policy = policy_for(task.policy, env, task.gains)
+    policy = policy_for(task.cases[0].policy, env, task.cases[0].gains)
     results = [run_episode(env, policy, seed, options=reset_options, **options) for seed in task.seeds]
-    return [result if i < task.record_episodes else Episode(result.row, {}) for i, result in enumerate(results)]
+    return [result if i in recorded else Episode(result.row, {}) for i, result in enumerate(results)]
+
+
+def _policies(cases: Sequence[Case], env: Any) -> SideBySide:
+    """Build each policy once; those of one registered name that differ in gains may be computed at once."""
+    made: dict[str, Policy] = {}
+    policies, kinds = list[Policy](), list[str]()
+    for case in cases:
+        kind = case.policy.name if isinstance(case.policy, ControllerSpec) else str(id(case.policy))
+        key = repr((kind, case.gains))
+        if key not in made:
+            made[key] = policy_for(case.policy, env, case.gains)
+        policies.append(made[key])
+        kinds.append(kind)
+    return SideBySide(policies, kinds, env.action_layout.size)
 
 
 def labels_of(task: Task, number: int) -> dict[str, Any]:
     """Return the columns that identify a row's episode: the task's episode at index `number`."""
+    case = task.cases[number]
     return {
-        "controller": task.controller,
-        "env": task.cell.env_id,
-        "scenario": task.cells[number].name,
+        "controller": case.controller,
+        "env": case.cell.env_id,
+        "scenario": case.cell.name,
         "seed": task.seeds[number],
         "episode": task.episodes[number],
     }

@@ -15,7 +15,7 @@ from gymnasium.envs.registration import EnvSpec
 from typer.testing import CliRunner
 
 from artde_gym.cli import app
-from artde_gym.errors import DisturbanceError, OptionError
+from artde_gym.errors import ActionError, DisturbanceError, OptionError
 from artde_gym.evaluation import Result, evaluate
 from artde_gym.evaluation.tasks import Update, chunks_of
 from artde_gym.motion.motion import KEY
@@ -155,6 +155,101 @@ def test_interruption_and_continuation(tmp_path: Path, monkeypatch: pytest.Monke
     same(resumed, whole)
     assert (tmp_path / "part" / "episodes.csv").read_bytes() == (tmp_path / "whole" / "episodes.csv").read_bytes()
     assert not (tmp_path / "part" / "traces").exists()
+
+
+class Raw:
+    """A policy of a user: it has no diagnostics, tells float32, and writes into what it observes."""
+
+    name = "raw"
+
+    def predict(self, observation: Any, state: Any = None, episode_start: Any = None, **_: Any) -> Any:
+        count = np.zeros(len(observation)) if state is None else np.where(episode_start, 0.0, state)
+        action = np.zeros((len(observation), 4), np.float32)
+        action[:, 0] = 14.7 + 0.1 * np.sin(count)
+        observation[:] = np.nan
+        return action, count + 1.0
+
+
+SHARED: dict[str, Any] = {
+    "biped": {
+        "controllers": ["tde", "artde", "tde-stiff"],
+        "env_id": "BipedPush-v0",
+        "disturbances": {
+            "payload": {"mass": {"uniform": [0.5, 1.5]}},
+            "push": [{"magnitude": {"uniform": [1.0, 250.0]}, "start": 0.1, "duration": 0.1}],
+        },
+        "env_kwargs": {"engine": "mujoco", "duration": 0.8, "control_period": 0.002},
+    },
+    "quadrotor": {
+        "controllers": {"pid": "pid", "mine": Raw(), "artde": "artde", "soft": "artde", "ppo": "tde+ppo"},
+        "env_id": QUADROTOR,
+        "disturbances": {**WINDY, **FAILING},
+        "env_kwargs": {"duration": 1.6},
+        "gains": {"soft": {"gamma_0_p": 0.5}},
+    },
+    "arm": {
+        "controllers": ["tde", "artde", "pid"],
+        "env_id": "ArmTrack-Payload-v0",
+        "disturbances": {"payload": {"mass": {"uniform": [0.5, 1.5]}}},
+        "env_kwargs": {"engine": "mujoco", "duration": 0.6},
+    },
+}
+"""Controllers that share a vector environment, some of which end early."""
+
+
+@pytest.mark.parametrize("robot", SHARED)
+def test_controllers_in_one_vector_are_each_one_alone_to_the_bit(robot: str, tmp_path: Path) -> None:
+    options: dict[str, Any] = {**SHARED[robot], "episodes": 4, "record_episodes": 2, "vectorized": True}
+    seen: list[Update] = []
+    whole = evaluate(**options, out=tmp_path / "whole", on_progress=seen.append)
+    assert sum(update.ended for update in seen) == 1  # all of them ran at once
+    given, gains = options.pop("controllers"), options.pop("gains", {})
+    named = given if isinstance(given, dict) else {name: name for name in given}
+    for name, policy in named.items():
+        own = {label: values for label, values in gains.items() if label == name}
+        alone = evaluate({name: policy}, **options, gains=own, out=tmp_path / name)
+        one: Any = whole.episodes[whole.episodes["controller"] == name].reset_index(drop=True)
+        pd.testing.assert_frame_equal(one[list(alone.episodes)], alone.episodes, check_exact=True)
+        assert one.drop(columns=list(alone.episodes)).isna().all(axis=None)
+        traces = Path("traces", "custom")
+        assert len(list((tmp_path / name / traces).iterdir())) == 2
+        for path in (tmp_path / name / traces).iterdir():
+            stored, other = np.load(path), np.load(tmp_path / "whole" / traces / path.name)
+            assert stored.files == other.files
+            assert all(np.array_equal(stored[signal], other[signal]) for signal in stored.files)
+
+
+def test_workers_share_the_controllers_of_a_vector() -> None:
+    options: dict[str, Any] = {**SHARED["quadrotor"], "episodes": 3, "vectorized": True}
+    whole = evaluate(**options)
+    for workers in (2, 3):
+        seen: list[Update] = []
+        same(whole, evaluate(**options, workers=workers, on_progress=seen.append))
+        assert sum(update.ended for update in seen) == workers
+
+
+@pytest.mark.parametrize("share", [0.35, 0.6, 0.85])
+def test_a_vector_of_controllers_killed_in_the_middle_of_its_rows_goes_on(share: float, tmp_path: Path) -> None:
+    options: dict[str, Any] = {**SHARED["quadrotor"], "episodes": 3, "vectorized": True, "out": tmp_path}
+    evaluate(**options)
+    table = tmp_path / "episodes.csv"
+    whole = table.read_bytes()
+    table.write_bytes(whole[: round(share * len(whole))])
+    assert evaluate(**options).complete
+    assert table.read_bytes() == whole
+
+
+@pytest.mark.parametrize("shape", [(1,), (3,), (2, 4)])
+def test_actions_of_a_wrong_shape_are_refused_beside_other_controllers(shape: tuple[int, ...]) -> None:
+    class Wrong:
+        name = "wrong"
+
+        def predict(self, observation: Any, state: Any = None, **_: Any) -> Any:
+            return np.zeros((len(observation), *shape)), state
+
+    for given in ({"tde": "tde", "wrong": Wrong()}, {"wrong": Wrong(), "tde": "tde"}, {"wrong": Wrong()}):
+        with pytest.raises(ActionError, match=r"shape of the actions.*\(3, 4\)"):
+            fly(controllers=given, episodes=3)
 
 
 def test_traces_of_the_first_episodes_on_request(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import math
 from pathlib import Path
@@ -28,6 +29,7 @@ from artde_gym.studies.frontier.table import frontier_of
 from artde_gym.studies.reproduce.claims import outlasts
 from controllers import GainError
 
+TASKS = importlib.import_module("artde_gym.evaluation.tasks")
 PUSH, WALK = "BipedPush-v0", "BipedWalk-Payload-v0"
 GRID = [float(value) for value in range(20, 62, 2)]
 SHORT: dict[str, Any] = {"duration": 0.3, "actuator_inertia": "lumped"}
@@ -198,12 +200,13 @@ def test_rates_of_a_grid_are_those_of_its_episodes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("vary", ["payload.mass", "gains.k_p_p"])
-def test_an_interrupted_grid_goes_on(vary: str, tmp_path: Path) -> None:
+def test_an_interrupted_grid_goes_on(vary: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """After the first controller, or level, is finished; the whole is that of a grid without an interruption."""
     span = {"payload.mass": (0.5, 2.1, 1.6), "gains.k_p_p": (8.0, 10.0, 2.0)}[vary]
     options: dict[str, Any] = dict(zip(("low", "high", "tolerance"), span, strict=True))
     options |= {"episodes": 2, "grid": True, "vectorized": True, "env_kwargs": {"duration": 1.0}}
     names, env_id = ["tde", "artde"], "QuadInfinity-Payload-v0"
+    monkeypatch.setattr(TASKS, "CHUNK", 4)  # one controller's
     ended: list[float] = []
 
     def interrupt(value: float, update: Update) -> None:

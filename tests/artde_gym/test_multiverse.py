@@ -442,8 +442,10 @@ def test_policies_side_by_side_do_what_each_does_alone(env_id, suffixes):
         controllers.make("artde-robust", env),
         controllers.make("tde", env),
     ]
-    together = SideBySide(made, ["artde", "artde", "tde+kd", "tde+kd", "artde-robust", "tde"])
-    assert len(together._parts) == 4
+    together = SideBySide(
+        made, ["artde", "artde", "tde+kd", "tde+kd", "artde-robust", "tde"], env.unwrapped.action_layout.size
+    )
+    assert len(together.parts) == 4
     observation, _ = env.reset(seed=3)
     state: Any = None
     alone: list[Any] = [None] * 6
@@ -453,10 +455,12 @@ def test_policies_side_by_side_do_what_each_does_alone(env_id, suffixes):
         for i, policy in enumerate(made):
             one, alone[i] = policy.predict(observation[i : i + 1], state=alone[i], episode_start=start[i : i + 1])
             assert (action[i] == one[0]).all()
-        told = together.diagnostics(state)
-        for i, policy in enumerate(made):
-            for name, values in policy.diagnostics(alone[i]).items():
-                assert (told[name][i] == values[0]).all()
+        whole: Any
+        for (whole, rows), own in zip(together.parts, state.policies, strict=True):
+            for place, i in enumerate(np.arange(6)[rows]):
+                told, expected = whole.diagnostics(own), made[i].diagnostics(alone[i])
+                assert told.keys() == expected.keys()
+                assert all((told[name][place] == expected[name][0]).all() for name in told)
         start = np.zeros(6, np.bool_)
         observation = env.step(action)[0] + rng.normal(size=observation.shape) * 1e-3
     env.close()

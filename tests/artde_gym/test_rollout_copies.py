@@ -78,8 +78,8 @@ def test_many_episodes() -> None:
     env = vector(QUADROTOR, json.dumps(SHORT), 3)
     policy = controllers.make("artde", env)
     for one, other in zip(
-        run_vector(env, Flatterer(policy), [1, 2, 3], record_episodes=2),
-        run_vector(env, policy, [1, 2, 3], record_episodes=2),
+        run_vector(env, Flatterer(policy), [1, 2, 3], recorded=range(2)),
+        run_vector(env, policy, [1, 2, 3], recorded=range(2)),
         strict=True,
     ):
         equal(one, other)

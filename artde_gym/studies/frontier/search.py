@@ -13,8 +13,8 @@ both ends of the bracket: with 18 of 20 survived it is 70 to 97 %. Seeds are the
 and for every controller, so that two frontiers differ by the controllers and not by luck of the draw; they are one
 sample of the variation nonetheless. Levels off a controller's path through the bisection are not run: survival that
 falls and rises again between them stays unseen. With `grid`, every level is run with every controller, episode by
-episode so that an interruption leaves whole curves of fewer episodes behind; in vector environments all levels of a
-controller run side by side. There is then a half point for each controller, see `artde_gym.studies.frontier.half`.
+episode so that an interruption leaves whole curves of fewer episodes behind; in vector environments all levels of all
+controllers run side by side. There is then a half point for each controller, see `artde_gym.studies.frontier.half`.
 
 The ground force of the thesis is a grid of its own: `vary="grf_pulse.magnitude", grid=True` in scenario S1 or S2.
 

@@ -152,7 +152,7 @@ def _run(
 
 def _rows(plan: Design, job: Job, results: list[Episode]) -> Iterator[dict[str, Any]]:
     for i, (point, result) in enumerate(zip(job.points, results, strict=True)):
-        labels = {**labels_of(job.task, i), "controller": point.controller, "cell": point.id, "episode": 0}
+        labels = {**labels_of(job.task, i), "cell": point.id, "episode": 0}
         yield {**labels, **_columns(plan, job.task.episodes[i], point), **result.row}
 
 

@@ -9,13 +9,10 @@ from typing import Any, NamedTuple
 from artde_gym.errors import ArtdeGymError
 from artde_gym.evaluation.cells import shared_kwargs, validate_cell, vector_of
 from artde_gym.evaluation.gains import policy_for
-from artde_gym.evaluation.registered import METRICS, require_metrics
-from artde_gym.evaluation.rollout import Episode, Policy
+from artde_gym.evaluation.registered import METRICS
+from artde_gym.evaluation.rollout import Episode
 from artde_gym.evaluation.seeds import episode_seed
-from artde_gym.evaluation.side_by_side import SideBySide
-from artde_gym.evaluation.tasks import Task, run_task
-from artde_gym.evaluation.vector_rollout import run_vector
-from artde_gym.registration import ControllerSpec
+from artde_gym.evaluation.tasks import Case, Task, run_task
 from artde_gym.studies.sweep.design import SweepCell
 
 MOST = 200
@@ -70,36 +67,14 @@ def check_points(points: Sequence[Numbered], vectorized: bool, on_checked: Calla
 def run(job: Job, on_time: Callable[[float], None]) -> list[Episode]:
     """Run a job; what goes wrong is told with the worlds."""
     try:
-        return _run_batch(job, on_time) if job.task.vectorized else run_task(job.task, on_time)
+        return run_task(job.task, on_time)
     except ArtdeGymError as error:
         worlds = f"{job.task.controller} in world {', '.join(map(str, job.task.episodes))}"
         raise error.within(worlds) from error
 
 
-def _run_batch(job: Job, on_time: Callable[[float], None]) -> list[Episode]:
-    task = job.task
-    require_metrics(task.metrics)
-    env, options = vector_of(task.cells)
-    made: dict[str, Policy] = {}
-    for point in job.points:  # equal policies are computed at once
-        if (key := _key(point)) not in made:
-            made[key] = policy_for(point.spec, env, point.gains)
-    policy = SideBySide([made[_key(point)] for point in job.points], [point.spec.name for point in job.points])
-    return run_vector(env, policy, task.seeds, options=options, phases=task.cell.phases, on_progress=on_time)
-
-
-def _key(point: SweepCell) -> str:
-    return json.dumps([point.spec.name, point.gains])
-
-
 def _job(group: Sequence[Numbered], vectorized: bool) -> Job:
     numbers, points = zip(*group, strict=True)
-    first = points[0]
-    spec: ControllerSpec = first.spec
+    cases = tuple(Case(point.cell, point.controller, point.spec, point.gains, point.seed) for point in points)
     seeds = [episode_seed(point.seed, 0) for point in points]
-    names = ", ".join(dict.fromkeys(point.controller for point in points))
-    cells = tuple(point.cell for point in points)
-    task = Task(
-        vectorized, first.cell, names, spec, first.gains, list(numbers), seeds, 100.0, 0, cells, tuple(METRICS)
-    )  # fmt: skip
-    return Job(task, tuple(points))
+    return Job(Task(vectorized, cases, list(numbers), seeds, 100.0, 0, tuple(METRICS)), tuple(points))

@@ -156,7 +156,8 @@ def _run(task: Task, on_time: Callable[[float], None]) -> list[Episode]:
     try:
         return run_task(task, on_time)
     except ArtdeGymError as error:
-        cell = f"{task.controller} with {task.gains}, {task.cell.env_id} with {task.cell.kwargs}, seeds {task.seeds}"
+        gains, env_id, kwargs = task.cases[0].gains, task.cell.env_id, task.cell.kwargs
+        cell = f"{task.controller} with {gains}, {env_id} with {kwargs}, seeds {task.seeds}"
         raise error.within(cell) from error
 
 
