@@ -7,7 +7,7 @@ from artde_gym.studies.reproduce.claims import ADDED, Claim, adapts, beats, fall
 
 _FALL = {"tde": True, "atde": True, "artde": False}
 _WALK = {"tde": False, "atde": False, "artde": False}
-FITTED = "fitted: where the pattern appears in MuJoCo; in Bullet it appears at 52 %"
+FITTED = "fitted to the thesis' falls in MuJoCo"
 _SIZES = {
     "-GRF33": "with a ground force of 33 % of the weight: ",
     "-GRF45": f"with a ground force of 45 % of the weight ({FITTED}): ",

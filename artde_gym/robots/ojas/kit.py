@@ -5,7 +5,7 @@ payload's position (by up to 1 cm).
 
 The thesis applies a ground reaction force in all of its scenarios; S1 to S3 omit it. S1-GRF33 to S3-GRF50 add it, a
 double hump of 1 s from each landing, of 33, 45 or 50 % of the robot's nominal weight. 45 % is fitted to the thesis'
-pattern of falls in MuJoCo; in Bullet it appears at 52 %. 33 and 50 % bracket it.
+pattern of falls in MuJoCo. 33 and 50 % bracket it.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _S3 = {**_S2, "push": [_KICK, CHEST_PUSH, ARM_PUSH]}
 _PHASES = ((0.0, 28.0), (28.0, 37.0), (37.0, math.inf))
 _LEFT_OUT = "omits the thesis' ground force"
 _PUSHES = f"walk with a payload, pushes of 10 N at 28 s (chest) and 37 s (left arm); {_LEFT_OUT}"
-_FITTED = " (fitted to the thesis' falls in MuJoCo; in Bullet they appear at 52 %)"
+_FITTED = " (fitted to the thesis' falls in MuJoCo)"
 
 
 def _with_ground_force(name: str, percent: int) -> Scenario:
