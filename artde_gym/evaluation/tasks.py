@@ -120,9 +120,9 @@ def tasks_of(
 ) -> Iterator[Task]:
     """Yield tasks for the episodes of all cases, chunk by chunk, so that an interruption leaves whole comparisons.
 
-    In vector environments, controllers in one cell run at once, fewer of them in a task if there would be no task for
-    each worker. The number of workers never divides a controller's own episodes: a network's last bits may depend on
-    how many observations it gets.
+    In vector environments, controllers in one cell run at once, fewer of them in the last tasks, of which each worker
+    gets some. The number of workers never divides a controller's own episodes: a network's last bits may depend on how
+    many observations it gets.
 
     Args:
         cases: the cases to run; no two share both the cell's name and the controller.
@@ -138,19 +138,17 @@ def tasks_of(
     largest = max((len(own) for group in groups for own in group), default=1)
     size = 1 if not vectorized else max(1, SIDE_BY_SIDE // largest) if largest > 1 else CHUNK
     chunks = chunks_of(episodes, size)
-    least = workers // math.gcd(workers, len(chunks) * len(groups))  # so that all workers end at about the same time
-    for chunk in chunks:
-        for group in groups:
-            left = [
-                [
-                    run
-                    for run in itertools.product(own, chunk)
-                    if (run[0].cell.name, run[0].controller, run[1]) not in done
-                ]
-                for own in group
-            ]
-            for some in _portions([runs for runs in left if runs], least):
-                yield _task(some, vectorized, record_episodes, record_hz)
+    count = len(chunks) * len(groups)
+    rest = count % workers  # those left once each worker has had as many as the others
+    for place, (chunk, group) in enumerate(itertools.product(chunks, groups)):
+        left = [[run for run in itertools.product(own, chunk) if _key(*run) not in done] for own in group]
+        least = workers // math.gcd(workers, rest) if place >= count - rest else 1
+        for some in _portions([runs for runs in left if runs], least):
+            yield _task(some, vectorized, record_episodes, record_hz)
+
+
+def _key(case: Case, episode: int) -> tuple[str, str, int]:
+    return case.cell.name, case.controller, episode
 
 
 def _groups(cases: Collection[Case], together: bool) -> list[list[list[Case]]]:
