@@ -20,6 +20,8 @@ from controllers.laws.namespaces import namespace
 from controllers.laws.tracking import Array, JointInput, LawState
 from controllers.stacked import stacked_gains
 
+PACKAGE = f"{__package__}."
+
 
 class ControlInterface(NamedTuple):
     """An environment as its policy knows it: robot, layouts, bounds and control period."""
@@ -145,10 +147,12 @@ class Policy(abc.ABC):
     def stacked(self, policies: Sequence[Any]) -> Policy | None:
         """Return one policy that drives each row of observations as the policy at its place would alone, bit for bit.
 
-        None where it cannot: the policies differ in more than gains, or in gains that a law takes one by one.
+        None where it cannot: the policies differ in more than gains, or in gains that a law takes one by one, or their
+        class, law or gains are not this package's, so that no one knows how they take them.
         """
-        others = {(type(policy), policy.law()) for policy in policies if isinstance(policy, Policy)}
-        if self.law() is None or others != {(type(self), self.law())}:
+        own = all(getattr(part, "__module__", "").startswith(PACKAGE) for part in (type(self), *self.code))
+        same = all(type(policy) is type(self) and policy.law() == self.law() for policy in policies)
+        if self.law() is None or not (own and same):
             return None
         gains = stacked_gains([policy.gains for policy in policies])
         if gains is None:

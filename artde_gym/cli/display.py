@@ -61,7 +61,7 @@ class Display:
         if what != self._what:
             self._what = what
             self._progress.reset(self._bar)  # a full bar has stopped its clock
-        first, last = update.task.episodes[0], update.task.episodes[-1]
+        first, last = min(update.task.episodes), max(update.task.episodes)
         numbers = f"#{first}" if first == last else f"#{first}..{last}"
         key = (update.task.cell.name, update.task.controller, numbers)
         self._running[key] = update.time_s

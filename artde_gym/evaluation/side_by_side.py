@@ -61,9 +61,9 @@ class SideBySide:
         for i, (policy, rows) in enumerate(self.parts):
             if state.over[rows].all():
                 continue
-            seen = np.array(observation[rows])  # a copy: a policy may write into it
+            seen, starts = np.array(observation[rows]), np.array(episode_start[rows])  # copies: policies write
             own, state.policies[i] = policy.predict(
-                seen, state=state.policies[i], episode_start=episode_start[rows], deterministic=deterministic
+                seen, state=state.policies[i], episode_start=starts, deterministic=deterministic
             )
             self._take(own, len(seen), state.actions, rows)
         return state.actions, state

@@ -152,11 +152,18 @@ def _key(case: Case, episode: int) -> tuple[str, str, int]:
 
 
 def _groups(cases: Collection[Case], together: bool) -> list[list[list[Case]]]:
-    """Put cases together that one vector can run, those of each controller in a list."""
+    """Put cases together that one vector can run, those of each controller in a list.
+
+    A policy object under several names drives one of them at a time: it may have a memory of its own.
+    """
     groups: dict[str, dict[str, list[Case]]] = {}
+    turns: dict[int, dict[str, int]] = {}
     for case in cases:
-        cell = case.cell
-        key = (case.seed, cell.env_id, shared_kwargs(cell), cell.phases, None if together else cell.name)
+        cell, turn = case.cell, 0
+        if not isinstance(case.policy, ControllerSpec):
+            names = turns.setdefault(id(case.policy), {})
+            turn = names.setdefault(case.controller, len(names))
+        key = (case.seed, cell.env_id, shared_kwargs(cell), cell.phases, None if together else cell.name, turn)
         groups.setdefault(repr(key), {}).setdefault(repr((case.controller, case.gains)), []).append(case)
     return [list(group.values()) for group in groups.values()]
 
@@ -204,12 +211,16 @@ def run_task(task: Task, on_progress: Callable[[float], None]) -> list[Episode]:
 
 
 def _policies(cases: Sequence[Case], env: Any) -> SideBySide:
-    """Build each policy once; those of one registered name that differ in gains may be computed at once."""
+    """Build each controller's policy once; those of one registered name that differ in gains may be computed at once.
+
+    Controllers that differ by name alone have a policy each: a network's last bits may depend on how many observations
+    it gets.
+    """
     made: dict[str, Policy] = {}
     policies, kinds = list[Policy](), list[str]()
     for case in cases:
         kind = case.policy.name if isinstance(case.policy, ControllerSpec) else str(id(case.policy))
-        key = repr((kind, case.gains))
+        key = repr((case.controller, case.gains))
         if key not in made:
             made[key] = policy_for(case.policy, env, case.gains)
         policies.append(made[key])

@@ -219,6 +219,38 @@ def test_controllers_in_one_vector_are_each_one_alone_to_the_bit(robot: str, tmp
             assert all(np.array_equal(stored[signal], other[signal]) for signal in stored.files)
 
 
+class Counting:
+    """A policy that keeps its memory to itself, in which episodes at once are not told apart, nor are their number."""
+
+    name = "counting"
+
+    def predict(self, observation: Any, state: Any = None, **_: Any) -> Any:
+        self.calls = 0 if state is None else self.calls + 1
+        thrust = 14.7 + 0.1 * np.sin(self.calls) + 0.001 * len(observation)
+        return np.tile([thrust, 0.0, 0.0, 0.0], (len(observation), 1)), True
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_one_policy_under_two_names_drives_as_under_each_alone(workers: int) -> None:
+    policy = Counting()
+    options: dict[str, Any] = {"episodes": 3, "duration": 0.4, "workers": workers}
+    whole: Any = fly(controllers={"one": policy, "tde": "tde", "two": policy}, **options).episodes
+    for name in ("one", "two"):
+        alone: Any = fly(controllers={name: policy}, **options).episodes
+        one = whole[whole["controller"] == name].reset_index(drop=True)
+        pd.testing.assert_frame_equal(one[list(alone)], alone, check_exact=True)
+
+
+def test_gains_in_arrays_are_told_apart_to_the_last_bit() -> None:
+    gains = {name: {"k_p_p": np.array([8.0, 8.0, last])} for name, last in (("soft", 8.0), ("hard", 8.0 + 1e-10))}
+    options: dict[str, Any] = {"episodes": 2, "duration": 0.4}
+    whole: Any = fly(controllers=dict.fromkeys(gains, "tde"), gains=gains, **options).episodes
+    for name, own in gains.items():
+        alone: Any = fly(controllers={name: "tde"}, gains={name: own}, **options).episodes
+        one = whole[whole["controller"] == name].reset_index(drop=True)
+        pd.testing.assert_frame_equal(one, alone, check_exact=True)
+
+
 def test_workers_share_the_controllers_of_a_vector() -> None:
     options: dict[str, Any] = {**SHARED["quadrotor"], "episodes": 3, "vectorized": True}
     whole = evaluate(**options)

@@ -20,7 +20,7 @@ BIPED = "BipedWalk-Payload-v0"
 
 
 class Flatterer:
-    """A policy that writes into its observations, and into the diagnostics that it gave away, after its decision."""
+    """A policy that writes into what it is handed, and into the diagnostics that it gave away, after its decision."""
 
     def __init__(self, policy: Any) -> None:
         self.policy = policy
@@ -35,6 +35,8 @@ class Flatterer:
         self.given = []
         action, state = self.policy.predict(observation.copy(), state=state, episode_start=episode_start)
         observation[...] = 0.0
+        if isinstance(episode_start, np.ndarray):
+            episode_start[...] = False
         return action, state
 
     def diagnostics(self, state: Any) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
@@ -64,6 +65,16 @@ def short(gains, state, signals, period):
 
 
 SHORT = LawSpec(Law(leaky_init, short), LeakyGains, "one component", like="tde")
+"""
+SCALAR = """
+
+def scalar(gains, state, signals, period):
+    rate = 2.0 if gains.gamma_0 > 100.0 else 1.0
+    force, state = artde(gains, state, signals, period)
+    return force + 0.01 * rate * gains.gamma_0 * (signals.q_ref - signals.q), state
+
+
+SCALAR = LawSpec(Law(artde_init, scalar), ArtdeGains, "gains that are numbers", like="artde")
 """
 ROBOTS: dict[str, tuple[str, dict[str, Any]]] = {
     "ojas": ("BipedWalk-Payload-v0", {"duration": 0.2}),
@@ -186,6 +197,34 @@ def test_further_gains_need_defaults_and_controllers_gains() -> None:
         check_law("mine", LawSpec(spec.law, like="tde"))
     with pytest.raises(UnknownNameError, match="module:object"):
         controllers.register_law("mine", "leaky")
+
+
+@pytest.mark.parametrize("robot", ["q450", "arm"])
+def test_a_law_whose_gains_are_numbers_gets_numbers_beside_itself_at_other_gains(monkeypatch, tmp_path, robot) -> None:
+    imports = "from controllers.laws.artde import ArtdeGains, artde, artde_init"
+    (tmp_path / "scalar_law.py").write_text(
+        LAW.replace("import dataclasses\n", f"import dataclasses\n{imports}\n") + SCALAR
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(registration, "_controllers", dict(registration._controllers))
+    controllers.register_law("scalar", "scalar_law:SCALAR")
+    env_id, kwargs = ROBOTS[robot]
+    engine = {} if robot == "q450" else {"engine": "mujoco"}
+    suffixes = ("_p", "_q") if robot == "q450" else ("",)
+    gains = {name: {f"gamma_0{one}": rate for one in suffixes} for name, rate in (("low", 50.0), ("high", 200.0))}
+    options: dict[str, Any] = {"episodes": 2, "env_kwargs": {**kwargs, **engine}, "vectorized": True}
+    whole: Any = evaluate(dict.fromkeys(gains, "scalar"), env_id, gains=gains, **options).episodes
+    for name, own in gains.items():
+        alone: Any = evaluate({name: "scalar"}, env_id, gains={name: own}, **options).episodes
+        one = whole[whole["controller"] == name].reset_index(drop=True)
+        pd.testing.assert_frame_equal(one, alone, check_exact=True)
+
+
+def test_a_policy_beside_objects_of_other_classes_is_not_stacked() -> None:
+    with make_env("arm") as env:
+        low, high = (controllers.make("artde", env, gamma_0=rate) for rate in (50.0, 200.0))
+        assert low.stacked([low, high]) is not None
+        assert low.stacked([low, high, object()]) is None
 
 
 def test_names_of_this_projects_controllers_are_taken(law: Any) -> None:
