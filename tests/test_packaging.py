@@ -65,6 +65,12 @@ def test_the_sdist_has_what_its_documentation_and_tests_read():
     assert needed - own <= set(manifest)
 
 
+def test_extras_in_workflows_are_quoted_since_a_comma_splits_arguments_of_powershell():
+    for workflow in (ROOT / ".github/workflows").glob("*.yml"):  # an sdist has none
+        given = re.findall(r"(\S?)\.\[\w+(?:,\w+)+\]", workflow.read_text(encoding="utf-8"))
+        assert set(given) <= {"'", '"'}
+
+
 def test_a_released_readme_leads_to_the_repository():
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     base = "https://host.example/owner/repository"
