@@ -19,7 +19,7 @@ CUDA := ^(cuda|nvidia)-|^triton=
 .PHONY: help evaluate test tests clients coverage lowest check format benchmark soak docs gallery viewer constraints dist clean
 
 help:  ## list the targets
-	@sed -n 's/^\([a-z]*\):.*  ## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
+	@awk -F ':.*  ## ' '/^[a-z]+:.*  ## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 evaluate: $(VENV)/core  ## the main job: TDE, ATDE and ARTDE beside the thesis, into runs/main (more options: ARGS=...)
 	$(BIN)/artde-gym evaluate --episodes 3 --out runs/main $(ARGS)

@@ -51,8 +51,18 @@ def cached(kind: str, key: Mapping[str, Any], modules: tuple[str, ...], compute:
 
 
 def folder() -> Path:
-    """Return the folder, which may not exist."""
-    return platformdirs.user_cache_path("artde-gym", appauthor=False)
+    """Return the folder, which may not exist.
+
+    Raises:
+        OSError: if the user has no home, as in a container that runs as a user whom it does not know.
+    """
+    try:
+        found = platformdirs.user_cache_path("artde-gym", appauthor=False)
+    except RuntimeError as error:
+        raise OSError(str(error)) from error
+    if not found.is_absolute():  # older releases of platformdirs return a folder named ~
+        raise OSError("no home")
+    return found
 
 
 def _read(file: Path) -> Array:

@@ -58,6 +58,19 @@ def test_licenses_of_everything_that_is_bundled_are_the_distributions_own():
     assert all((ROOT / name).is_file() for name in PROJECT["license-files"])
 
 
+def test_the_sdist_has_what_its_documentation_and_tests_read():
+    manifest = (ROOT / "MANIFEST.in").read_text(encoding="utf-8").split()
+    own = {"README.md", "pyproject.toml"}  # setuptools adds them
+    needed = {path.name for kind in ("*.md", "*.toml", "*.cff", "mkdocs.yml") for path in ROOT.glob(kind)}
+    assert needed - own <= set(manifest)
+
+
+def test_extras_in_workflows_are_quoted_since_a_comma_splits_arguments_of_powershell():
+    for workflow in (ROOT / ".github/workflows").glob("*.yml"):  # an sdist has none
+        given = re.findall(r"(\S?)\.\[\w+(?:,\w+)+\]", workflow.read_text(encoding="utf-8"))
+        assert set(given) <= {"'", '"'}
+
+
 def test_a_released_readme_leads_to_the_repository():
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     base = "https://host.example/owner/repository"

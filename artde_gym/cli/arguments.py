@@ -136,7 +136,7 @@ def given_disturbances(text: str | None) -> dict[str, Any] | None:
     """
     if text is not None and text.endswith(".json"):
         with wrap_read_errors("--disturbances", Path(text), "JSON, or a .json file of it", OptionError):
-            text = Path(text).read_text(encoding="utf-8")
+            text = Path(text).read_text(encoding="utf-8-sig")  # editors on Windows begin a file with a mark
     return optional_json("--disturbances", text)
 
 

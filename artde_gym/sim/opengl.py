@@ -17,6 +17,7 @@ from typing import Any
 from artde_gym.errors import OptionError
 
 VARIABLE = "MUJOCO_GL"
+_PYOPENGL = "PYOPENGL_PLATFORM"  # MuJoCo draws through PyOpenGL and refuses another platform than its own
 _LIBRARIES = {"egl": "libEGL.so.1", "osmesa": "libOSMesa.so.8"}
 _PACKAGES = {"egl": "libegl1 libgl1-mesa-dri", "osmesa": "libosmesa6"}  # Debian's
 _UNSPECIFIC = ("", "enable", "enabled", "on", "true", "1", "disable", "disabled", "off", "false", "0", "glfw")
@@ -89,6 +90,10 @@ def _loads(name: str) -> bool:
 
 
 def _made(name: str) -> Any:
+    platform = os.environ.get(_PYOPENGL, "")
+    if name in _LIBRARIES and platform.lower() not in ("", name):
+        remedy = f"set it to {name!r}, or unset it"
+        raise OptionError(f"environment variable {_PYOPENGL}", platform, remedy, f"contradicts MuJoCo's {name!r}")
     try:
         return importlib.import_module(f"mujoco.{name}").GLContext(1, 1)  # any size: it draws into its own buffer
     except Exception as error:  # PyOpenGL raises AttributeError, GLFW an error of its own

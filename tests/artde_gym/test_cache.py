@@ -129,3 +129,18 @@ def test_environments_that_walk_alike_share_a_plan_that_cannot_be_written() -> N
     observation[:] = 0.0  # an observation is the user's own
     for env in (first, second, slower):
         env.close()
+
+
+def test_a_user_without_a_home_computes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    pwd = pytest.importorskip("pwd")
+
+    def unknown(user: int) -> None:
+        raise KeyError(user)
+
+    monkeypatch.setattr(pwd, "getpwuid", unknown)
+    for name in ("HOME", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.chdir(tmp_path)
+    found = cache.cached("numbers", {"number": 5}, (), lambda: np.full(3, 5.0))
+    assert np.array_equal(found, np.full(3, 5.0))
+    assert not list(tmp_path.iterdir())  # no folder named ~

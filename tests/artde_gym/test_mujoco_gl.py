@@ -9,6 +9,9 @@ import sys
 
 import pytest
 
+from artde_gym.errors import OptionError
+from artde_gym.sim import opengl
+
 # OSMesa's library is hidden by its name, so that it is missing on every machine
 SCRIPT = """
 import json, os, sys
@@ -60,3 +63,12 @@ def test_only_what_draws_minds_the_variable(value: str, problem: str, remedy: st
     assert found == f"environment variable MUJOCO_GL {value!r} {problem}"
     assert failed == []
     assert left == value, "the user's variable is changed"
+
+
+@linux
+def test_another_platform_of_pyopengl_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(opengl, "_loads", lambda name: name == "egl")
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    monkeypatch.setenv("PYOPENGL_PLATFORM", "glx")
+    with pytest.raises(OptionError, match="PYOPENGL_PLATFORM 'glx' contradicts MuJoCo's 'egl'; set it to 'egl', or"):
+        opengl.context()

@@ -198,3 +198,19 @@ class _Contexts:
 
 def test_the_package_is_found_without_its_checkout() -> None:
     assert artde_gym.__version__
+
+
+def test_files_of_users_may_be_written_by_an_editor_on_windows(tmp_path: Path) -> None:
+    pytest.importorskip("yaml")
+    from artde_gym.cli.arguments import given_disturbances
+    from artde_gym.multibody.model_file import model_text, parsed
+    from artde_gym.studies.sweep.design import read
+
+    def written(name: str, text: str) -> Path:
+        (tmp_path / name).write_bytes(b"\xef\xbb\xbf" + text.replace("\n", "\r\n").encode())
+        return tmp_path / name
+
+    assert given_disturbances(str(written("some.json", '{\n"payload": 1.3\n}\n'))) == {"payload": 1.3}
+    assert read(written("sweep.yaml", "scenario: S1\nepisodes: 2\n")) == {"scenario": "S1", "episodes": 2}
+    model = written("arm.urdf", '<?xml version="1.0" encoding="utf-8"?>\n<robot name="a"/>\n')
+    assert parsed(model_text(model), "arm.urdf").tag == "robot"
