@@ -18,6 +18,7 @@ from artde_gym.sim import factory
 
 FLIGHT = ["--env", "QuadInfinity-Payload-v0"]
 SHORT = [*FLIGHT, "--controllers", "tde", "--out", "out", "--env-kwargs", '{"duration": 0.1}', "--disturbances", "{}"]
+TRAINS = pytest.mark.torch  # without PyTorch, it is what is missing
 NO_BULLET = "PyBullet has no wheel for CPython 3.13"
 IN_ENGINES = {
     "evaluate": [*SHORT, "--episodes", "1"],
@@ -34,6 +35,16 @@ IN_ENGINES = {
 
 def refusal(words: list[str]) -> BaseException | None:
     return CliRunner().invoke(app, words).exception
+
+
+def forget(prefixes: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let modules be imported anew, until the test ends; then their packages have the former ones again."""
+    found = {name: module for name, module in sys.modules.items() if name.startswith(prefixes)}
+    for name, module in found.items():
+        package, _, own = name.rpartition(".")
+        monkeypatch.delitem(sys.modules, name)
+        if package in sys.modules:
+            monkeypatch.setattr(sys.modules[package], own, module, raising=False)
 
 
 @pytest.fixture(autouse=True)
@@ -60,10 +71,12 @@ def test_each_command_refuses_an_engine_that_is_missing(
 @pytest.mark.parametrize(
     ("package", "words", "extra"),
     [
-        ("stable_baselines3", ["train", *IN_ENGINES["train"]], "rl"),
+        pytest.param("stable_baselines3", ["train", *IN_ENGINES["train"]], "rl", marks=TRAINS),
         ("torch", ["train", *IN_ENGINES["train"]], "rl"),
-        ("tensorboard", ["train", *IN_ENGINES["train"]], "rl"),
-        ("cmaes", ["train", "--env", "BipedPush-v0", "--algo", "cma-es", "--out", "out"], "rl"),
+        pytest.param("tensorboard", ["train", *IN_ENGINES["train"]], "rl", marks=TRAINS),
+        pytest.param(
+            "cmaes", ["train", "--env", "BipedPush-v0", "--algo", "cma-es", "--out", "out"], "rl", marks=TRAINS
+        ),
         ("optuna", ["tune", *IN_ENGINES["tune"]], "tune"),
         ("yaml", ["sweep", "sweep.yaml", "--out", "out"], "sweep"),
         ("pyarrow", ["sweep", "sweep.yaml", "--out", "out"], "sweep"),
@@ -79,12 +92,7 @@ def test_each_command_refuses_an_engine_that_is_missing(
 def test_each_command_says_which_extra_it_needs(
     package: str, words: list[str], extra: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    for name in [
-        name
-        for name in sys.modules
-        if name.startswith(("baselines.t", "artde_gym.studies.sweep.yaml12", "websockets", "artde_gym.play."))
-    ]:
-        monkeypatch.delitem(sys.modules, name)
+    forget(("baselines.t", "artde_gym.studies.sweep.yaml12", "websockets", "artde_gym.play."), monkeypatch)
     monkeypatch.setitem(sys.modules, package, None)
     error = refusal(words)
     assert isinstance(error, OptionError), repr(error)

@@ -82,7 +82,8 @@ def test_a_current_folder_that_is_gone_is_named(here: Path) -> None:
         f"import os; os.chdir({str(here / 'gone')!r}); os.rmdir(os.getcwd()); from artde_gym.cli import main; main()"
     )
     words = ["evaluate", "--scenario", "Q1", "--out", str(here / "out")]
-    done = subprocess.run([sys.executable, "-c", script, *words], capture_output=True, text=True, check=False)
+    command = [sys.executable, "-P", "-c", script, *words]  # as the command, without the current folder in `sys.path`
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert done.stderr.startswith("artde-gym: current folder ")
     assert done.stderr.endswith("does not exist anymore; change to another one\n")
