@@ -36,14 +36,16 @@ failed = [line.what for line in python() if line.status == "failed"]
 print(json.dumps([said, list(pictures._picture("mujoco", "MuJoCo")), failed, os.environ["MUJOCO_GL"]]))
 """
 
-linux = pytest.mark.skipif(sys.platform != "linux", reason="EGL and OSMesa are of Linux")
-
 
 @pytest.mark.parametrize(
     ("value", "problem", "remedy"),
     [
-        pytest.param("nonsense", "is no renderer here", "set it to 'egl' or 'osmesa', or unset it", marks=linux),
-        pytest.param(" OSMesa", "needs libNone.so.8, which is missing", "apt install libosmesa6", marks=linux),
+        pytest.param(
+            "nonsense", "is no renderer here", "set it to 'egl' or 'osmesa', or unset it", marks=pytest.mark.linux
+        ),
+        pytest.param(
+            " OSMesa", "needs libNone.so.8, which is missing", "apt install libosmesa6", marks=pytest.mark.linux
+        ),
         ("wgl" if sys.platform != "win32" else "cgl", "is no renderer here", "or unset it"),
     ],
 )
@@ -65,7 +67,7 @@ def test_only_what_draws_minds_the_variable(value: str, problem: str, remedy: st
     assert left == value, "the user's variable is changed"
 
 
-@linux
+@pytest.mark.linux
 def test_another_platform_of_pyopengl_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(opengl, "_loads", lambda name: name == "egl")
     monkeypatch.delenv("MUJOCO_GL", raising=False)

@@ -404,7 +404,7 @@ def test_without_scikit_learn_everything_else_works(monkeypatch, biped, tmp_path
     assert (biped.folder / "report.html").stat().st_size > 10_000
 
 
-def test_the_record_says_that_nobody_asked_for_the_engine(quadrotor):
+def test_the_record_says_that_the_engine_is_the_default(quadrotor):
     assert quadrotor.provenance["engines"] == {"numpy": "default"}
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from artde_gym.robots.ojas.kit import FITTED
 from artde_gym.robots.ojas.thesis import JOINTS
 from artde_gym.studies.reproduce.claims import ADDED, Claim, adapts, beats, falls, improves, outlasts, repeats, stays
 
 _FALL = {"tde": True, "atde": True, "artde": False}
 _WALK = {"tde": False, "atde": False, "artde": False}
-FITTED = "fitted to the thesis' falls in MuJoCo"
 _SIZES = {
     "-GRF33": "with a ground force of 33 % of the weight: ",
     "-GRF45": f"with a ground force of 45 % of the weight ({FITTED}): ",

@@ -39,7 +39,8 @@ _S3 = {**_S2, "push": [_KICK, CHEST_PUSH, ARM_PUSH]}
 _PHASES = ((0.0, 28.0), (28.0, 37.0), (37.0, math.inf))
 _LEFT_OUT = "omits the thesis' ground force"
 _PUSHES = f"walk with a payload, pushes of 10 N at 28 s (chest) and 37 s (left arm); {_LEFT_OUT}"
-_FITTED = " (fitted to the thesis' falls in MuJoCo)"
+FITTED = "fitted to the thesis' falls in MuJoCo"
+"""What the scenarios and claims with 45 % of the weight say of this size."""
 
 
 def _with_ground_force(name: str, percent: int) -> Scenario:
@@ -48,7 +49,9 @@ def _with_ground_force(name: str, percent: int) -> Scenario:
         name
     ]
     pulse = {"shape": "double_hump", "share": percent / 100, "duration": 1.0, "trigger": "contact"}
-    text = f"{name} with the thesis' ground force, {percent} % of the weight" + (_FITTED if percent == 45 else "")
+    text = f"{name} with the thesis' ground force, {percent} % of the weight" + (
+        f" ({FITTED})" if percent == 45 else ""
+    )
     return Scenario(f"{name}-GRF{percent}", env_id, {}, {**disturbances, "grf_pulse": pulse}, text, name, phases)
 
 
