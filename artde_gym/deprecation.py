@@ -17,7 +17,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import ModuleType
 from typing import Any, TypeVar, cast
 
-from artde_gym.errors import DisturbanceError
+from artde_gym.errors import DisturbanceError, OptionError
 
 T = TypeVar("T", bound=Callable[..., Any])
 
@@ -148,6 +148,8 @@ def renamed_arguments(names: Mapping[str, str], values: Mapping[Any, Any] | None
         @functools.wraps(function)
         def call(*args: Any, **kwargs: Any) -> Any:
             for old in names.keys() & kwargs.keys():
+                if names[old] in kwargs:
+                    raise OptionError(f"argument {old!r}", kwargs[old], f"only {names[old]!r}, its new name")
                 warn(f"argument {old!r} of {target.__name__}", repr(names[old]))
                 value = kwargs.pop(old)
                 kwargs[names[old]] = (values or {}).get(value, value) if isinstance(value, str) else value

@@ -75,6 +75,9 @@ class MissingDependencyError(OptionError, ModuleNotFoundError):
 class ActionError(ArtdeGymError):
     """An action with the wrong shape or a value that is not finite."""
 
+    environment = 0
+    """Number of the first environment of a vector to which it was given."""
+
 
 class DisturbanceError(ArtdeGymError):
     """A disturbance that violates the grammar of `artde_gym.disturbances`."""

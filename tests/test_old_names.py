@@ -130,6 +130,30 @@ def test_old_arguments_of_an_evaluation() -> None:
     with pytest.warns(DeprecationWarning, match="is deprecated; use"):
         old = evaluate(["tde"], QUADROTOR, **options)
     assert old.episodes.equals(new.episodes)
+    with pytest.raises(OptionError, match="only 'vectorized', its new name"):
+        evaluate(["tde"], QUADROTOR, backend="single", **SHORT)  # pyright: ignore[reportCallIssue]
+
+
+@pytest.mark.parametrize(
+    ("options", "old"),
+    [
+        (["evaluate", "--vectorized", "--backend", "single"], "--backend"),
+        (["frontier", "--vary", "wind.scale", "--vectorized", "--backend", "single"], "--backend"),
+        (["evaluate", "--record-episodes", "2", "--traced", "0"], "--traced"),
+        (["evaluate", "--record-hz", "20", "--trace-hz", "50"], "--trace-hz"),
+        (["train", "--action-mode", "attitude", "--channel", "cascade"], "--channel"),
+        (["train", "--action-scale", "1", "--limit", "2"], "--limit"),
+    ],
+)
+def test_an_old_option_beside_the_new_one_is_refused(options: list[str], old: str, tmp_path: Path) -> None:
+    if options[0] == "train":
+        pytest.importorskip("torch", exc_type=ImportError)
+    words = [*options, "--env", QUADROTOR, "--out", str(tmp_path / "run")]
+    outcome = CliRunner().invoke(app, words)
+    assert outcome.exit_code != 0
+    said = outcome.output + str(outcome.exception)
+    assert old in said
+    assert "its new name" in said
 
 
 def test_old_options_of_the_command_line(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import typer
 
@@ -17,6 +17,8 @@ from artde_gym.arguments import wrap_read_errors
 from artde_gym.errors import OptionError
 from artde_gym.files import making_folder
 from artde_gym.sim.factory import ENGINES
+
+T = TypeVar("T")
 
 WALK = "BipedWalk-Payload-v0"
 
@@ -50,9 +52,18 @@ Pictures = Annotated[
 Videos = Annotated[bool, typer.Option("--videos", help="Add a video of each scenario to the report (needs ffmpeg).")]
 
 
-def renamed_option(old: str, new: str) -> None:
-    """Warn of a deprecated option."""
+def renamed_option(old: str, value: T | None, new: str, given: T, default: T) -> T:
+    """Return the value of an option, `value` under its deprecated name `old`, else the one `given` under the new name.
+
+    Raises:
+        OptionError: if it is given under both.
+    """
+    if value is None:
+        return given
+    if given != default:
+        raise OptionError(old, value, f"only {new}, its new name")
     typer.echo(f"{old} is deprecated; use {new}", err=True)
+    return value
 
 
 def vectorized_by(vectorized: bool, backend: str | None) -> bool:
@@ -61,12 +72,11 @@ def vectorized_by(vectorized: bool, backend: str | None) -> bool:
     Raises:
         OptionError: for an unknown backend.
     """
-    if backend is None:
-        return vectorized
-    if backend not in ("single", "batch"):
+    if backend not in (None, "single", "batch"):
         raise OptionError("--backend", backend, "'batch', 'single'; better use --vectorized")
-    renamed_option("--backend", "--vectorized")
-    return backend == "batch"
+    return renamed_option(
+        "--backend", None if backend is None else backend == "batch", "--vectorized", vectorized, False
+    )
 
 
 def names(option: str, text: str) -> list[str]:

@@ -36,6 +36,8 @@ from artde_gym.cli.report import show_report
 from artde_gym.evaluation.environments import main_scenarios
 from artde_gym.scenarios import CUSTOM
 
+RECORD_HZ = 100.0
+
 
 def evaluate(
     controllers: Controllers = "tde,atde,artde",
@@ -61,7 +63,7 @@ def evaluate(
         int | None, typer.Option(help="Number of episodes whose signals are stored. Default: all; none if vectorized.")
     ] = None,
     traced: Annotated[int | None, typer.Option(hidden=True)] = None,
-    record_hz: Annotated[float, typer.Option(help="Rate of stored signals (Hz); inf for every step.")] = 100.0,
+    record_hz: Annotated[float, typer.Option(help="Rate of stored signals (Hz); inf for every step.")] = RECORD_HZ,
     trace_hz: Annotated[float | None, typer.Option(hidden=True)] = None,
     allow_mixed: AllowMixed = False,
     report: Report = False,
@@ -76,12 +78,8 @@ def evaluate(
     from artde_gym.evaluation.console import print_result
 
     vectorized = vectorized_by(vectorized, backend)
-    if traced is not None:
-        renamed_option("--traced", "--record-episodes")
-        record_episodes = traced
-    if trace_hz is not None:
-        renamed_option("--trace-hz", "--record-hz")
-        record_hz = trace_hz
+    record_episodes = renamed_option("--traced", traced, "--record-episodes", record_episodes, None)
+    record_hz = renamed_option("--trace-hz", trace_hz, "--record-hz", record_hz, RECORD_HZ)
     if scenario is None:
         env = WALK if env is None else env
         chosen = (main_scenarios(env) if disturbances is None else ()) or None

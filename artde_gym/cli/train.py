@@ -60,12 +60,8 @@ def train(
     from baselines.run import Training
     from baselines.tasks import task
 
-    if channel is not None:
-        renamed_option("--channel", "--action-mode")
-        action_mode = channel
-    if limit is not None:
-        renamed_option("--limit", "--action-scale")
-        action_scale = limit
+    action_mode = renamed_option("--channel", channel, "--action-mode", action_mode, "")
+    action_scale = renamed_option("--limit", limit, "--action-scale", action_scale, None)
     for option, value in (("--action-scale", action_scale), ("--decision-period", decision_period)):
         if value == 0:
             raise OptionError(option, value, "above 0; leave it out for the default")

@@ -270,7 +270,9 @@ class BaseVectorEnv(DisturbedMixin, VectorEnv[Array, ArrayLike, NDArray[Any]], a
         finite = np.isfinite(commands)
         if not finite.all():
             i = int(np.flatnonzero(~finite.all(axis=1))[0])
-            raise ActionError(f"action of environment {i}", commands[i].tolist(), f"finite {self.allowed_action}")
+            error = ActionError(f"action of environment {i}", commands[i].tolist(), f"finite {self.allowed_action}")
+            error.environment = i
+            raise error
         return commands.clip(self._low, self._high, commands)
 
     def _mask(self, given: Any) -> Mask:

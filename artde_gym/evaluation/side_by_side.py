@@ -65,7 +65,11 @@ class SideBySide:
             own, state.policies[i] = policy.predict(
                 seen, state=state.policies[i], episode_start=starts, deterministic=deterministic
             )
-            self._take(own, len(seen), state.actions, rows)
+            try:
+                self._take(own, len(seen), state.actions, rows)
+            except ActionError as error:
+                error.environment = int(np.arange(len(observation))[rows][0])
+                raise
         return state.actions, state
 
     def _take(self, own: Any, count: int, actions: Array, rows: Rows) -> None:

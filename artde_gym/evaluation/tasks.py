@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
+from artde_gym.errors import ActionError
 from artde_gym.evaluation.cells import Cell, shared_kwargs, single_of, vector_of
 from artde_gym.evaluation.gains import policy_for
 from artde_gym.evaluation.registered import METRICS, require_metrics
@@ -196,8 +197,20 @@ def chunks_of(episodes: int, size: int) -> list[range]:
 
 
 def run_task(task: Task, on_progress: Callable[[float], None]) -> list[Episode]:
-    """Run the episodes of a task; `on_progress` is called with the simulated time (s)."""
+    """Run the episodes of a task; `on_progress` is called with the simulated time (s).
+
+    Raises:
+        ActionError: for an action that an environment refuses, with the controller and the episode.
+    """
     require_metrics(task.metrics)
+    try:
+        return _run(task, on_progress)
+    except ActionError as error:
+        case, episode = task.cases[error.environment], task.episodes[error.environment]
+        raise error.within(f"{case.controller} in {case.cell.name}, episode {episode}") from error
+
+
+def _run(task: Task, on_progress: Callable[[float], None]) -> list[Episode]:
     recorded = {i for i, episode in enumerate(task.episodes) if episode < task.record_episodes}
     options: dict[str, Any] = {"record_hz": task.record_hz, "phases": task.cell.phases, "on_progress": on_progress}
     if task.vectorized:

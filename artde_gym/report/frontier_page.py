@@ -80,13 +80,17 @@ def parts(found: Frontier) -> list[str]:
 
 
 def survival_chart(found: Frontier, *, legend: bool = False) -> Chart:
-    """Draw the share of episodes without a fall over what is varied; a legend names each controller's margin."""
+    """Draw the share of episodes without a fall over what is varied.
+
+    A legend names each controller's margin: its half point in a grid, where the wanted share is then left out.
+    """
     axis = found.axis
     drawn = set(found.levels["controller"])
     shown = styles(name for row in _records(found.table) if (name := str(row["controller"])) in drawn)
     x = Axis.of(f"{axis.path} ({axis.unit})" if axis.unit != "1" else axis.path, [axis.low, axis.high])
     chart = Chart("Share of episodes without a fall against what was varied", x, Axis("no fall (%)", 0, 104), 460, 280)
-    chart.level(100 * found.survival, f"wanted: {100 * found.survival:g} %")
+    if found.half is None or not legend:
+        chart.level(100 * found.survival, f"wanted: {100 * found.survival:g} %")
     if found.half is not None:
         chart.level(50, "half")
     apart = min(0.012 * (axis.high - axis.low), 0.5 * axis.tolerance / len(shown))
@@ -101,9 +105,16 @@ def survival_chart(found: Frontier, *, legend: bool = False) -> Chart:
                 place, 100 * row["rate"], look, f"{name} at {row['value']:g}: {row['survived']}/{row['episodes']}"
             )
     if legend:
-        margins = {row["controller"]: value_text(row, axis.unit) for row in _records(found.table)}
-        chart.legend({f"{name}: {margins[name]}": look for name, look in shown.items()})
+        margins = _margins(found)
+        chart.legend({f"{name}: {margins.get(name, 'open')}": look for name, look in shown.items()})
     return chart
+
+
+def _margins(found: Frontier) -> dict[str, str]:
+    """Tell of each controller that was run where half survive, in a grid, or its frontier."""
+    if found.half is None:
+        return {row["controller"]: value_text(row, found.axis.unit) for row in _records(found.table)}
+    return {row["controller"]: f"half: {half_text(row, found.axis, unit=True)}" for row in _records(found.half)}
 
 
 def _half(found: Frontier) -> list[str]:

@@ -302,5 +302,8 @@ def test_command_with_scenarios_and_figures(tmp_path: Path) -> None:
     for word in ("falls at (N)", "0/1", "tde: > 60", "S2"):
         assert word in outcome.output
     for name in ("S1", "S2"):
-        assert (tmp_path / f"curve-{name}.svg").read_text().startswith("<svg")
+        drawn = (tmp_path / f"curve-{name}.svg").read_text()
+        assert drawn.startswith("<svg")
+        assert "tde: half: &gt; 60 (60..&gt; 60) N" in drawn
+        assert "wanted" not in drawn  # of a bisection
         assert (tmp_path / "run" / name / "half.csv").exists()

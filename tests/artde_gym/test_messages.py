@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -13,7 +14,8 @@ from typer.testing import CliRunner
 
 import controllers
 from artde_gym.cli import app
-from artde_gym.errors import ArtdeGymError, OptionError
+from artde_gym.errors import ActionError, ArtdeGymError, OptionError
+from artde_gym.evaluation import evaluate
 from controllers.laws.errors import GainError
 from controllers.laws.tde import TdeGains
 
@@ -34,6 +36,30 @@ def test_a_value_is_shortened_and_the_rule_follows() -> None:
 def test_an_environment_of_others_is_no_attribute_error() -> None:
     with pytest.raises(OptionError, match=r"environment to be controlled is .*CartPole.*; allowed: one of artde_gym"):
         controllers.make("tde", gym.make("CartPole-v1"))
+
+
+class Broken:
+    """A policy whose third action is wrong."""
+
+    def __init__(self, action: np.ndarray) -> None:
+        self.action = action
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
+    ) -> tuple[Any, Any]:
+        count = 0 if state is None else state
+        action = self.action if count == 2 else np.zeros(4)
+        return np.broadcast_to(action, (*observation.shape[:-1], len(action))), count + 1
+
+
+@pytest.mark.parametrize("vectorized", [False, True])
+@pytest.mark.parametrize(("action", "problem"), [(np.full(4, np.nan), "finite"), (np.zeros(5), "shape")])
+def test_a_wrong_action_names_its_controller_and_episode(action: np.ndarray, problem: str, vectorized: bool) -> None:
+    policies = {"tde": "tde", "broken": Broken(action)}
+    with pytest.raises(
+        ActionError, match=rf"broken in Q1, episode 0\b.*{problem}|{problem}.*broken in Q1, episode 0\b"
+    ):
+        evaluate(policies, scenario="Q1", episodes=2, vectorized=vectorized, env_kwargs={"duration": 0.1})
 
 
 def test_a_warning_is_one_line_once(tmp_path: Path) -> None:

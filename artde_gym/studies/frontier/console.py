@@ -66,8 +66,7 @@ def _print_grid(found: Frontier, console: Console) -> None:
         "Half of the episodes end without a fall at (95 % interval: bootstrap over seeds, no narrower than the grid):"
     )
     for row in found.half.to_dict(orient="records"):
-        number = "" if math.isnan(row["half"]) else unit
-        console.print(f"  {row['controller']}: {half_text(row, found.axis)}{number}")
+        console.print(f"  {row['controller']}: {half_text(row, found.axis, unit=True)}")
 
 
 def _falls(row: dict[Any, Any] | None) -> str:

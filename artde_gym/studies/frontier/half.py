@@ -84,16 +84,16 @@ def half_points(found: Frontier) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def half_text(row: dict[Any, Any], varied: Axis) -> str:
+def half_text(row: dict[Any, Any], varied: Axis, *, unit: bool = False) -> str:
     """Write a half point with its interval: "37.0 (36..38)", "> 60" where it lies beyond the grid."""
     if math.isnan(row["half"]):
         return "none, since survival rises"
     beyond = {math.inf: f"> {varied.high:g}", -math.inf: f"< {varied.low:g}"}
-    value = beyond.get(row["half"]) or f"{row['half']:.3g}"
-    if row["low"] == row["high"]:
-        return value
-    low, high = (beyond.get(row[end]) or f"{row[end]:g}" for end in ("low", "high"))
-    return f"{value} ({low}..{high})"
+    text = beyond.get(row["half"]) or f"{row['half']:.3g}"
+    if row["low"] != row["high"]:
+        low, high = (beyond.get(row[end]) or f"{row[end]:g}" for end in ("low", "high"))
+        text += f" ({low}..{high})"
+    return f"{text} {varied.unit}" if unit and varied.unit != "1" else text
 
 
 def _brackets(table: Array, grid: Sequence[float]) -> Array:
