@@ -17,7 +17,7 @@ from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.html import Cell, figure, table
 from artde_gym.studies.frontier.axis import Axis as Varied
 from artde_gym.studies.frontier.half import half_text
-from artde_gym.studies.frontier.result import RECORD, Frontier, direction_note, value_text
+from artde_gym.studies.frontier.result import RECORD, Frontier, direction_note, rising_note, value_text
 
 Rows = list[dict[Any, Any]]
 
@@ -48,6 +48,8 @@ def answer(found: Frontier) -> tuple[str, list[str]]:
     lines = [_sentence(row, found) for row in rows]
     if note := direction_note(found):
         lines.append(note)
+    if rises := rising_note(found):
+        lines.append(rises)
     if not known and note:
         return f"No controller survives the easiest level of {axis.path}.", lines
     if not known:

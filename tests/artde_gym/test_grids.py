@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import json
 import math
@@ -23,9 +24,9 @@ from artde_gym.report import frontier_page
 from artde_gym.studies import Frontier, frontier
 from artde_gym.studies.frontier.axis import Axis, Harder
 from artde_gym.studies.frontier.half import half_difference, half_point, half_text
-from artde_gym.studies.frontier.result import direction_note
+from artde_gym.studies.frontier.result import direction_note, rising_note
 from artde_gym.studies.frontier.standard import standard_test
-from artde_gym.studies.frontier.table import frontier_of
+from artde_gym.studies.frontier.table import LEVEL_COLUMNS, frontier_of
 from artde_gym.studies.reproduce.claims import outlasts
 from controllers import GainError
 
@@ -112,6 +113,22 @@ def test_a_hardest_level_that_is_survived_more_often_raises_a_question(harder: H
     ]
     assert asked in (note := direction_note(frontier_of(varied, ["tde"], rows, 0.9, None, True)))
     assert bool(note) == bool(asked)
+
+
+@pytest.mark.parametrize(("survived", "said"), [(6, "tde from 50 to 60 N"), (2, "")])
+def test_a_rise_between_levels_is_told(survived: int, said: str) -> None:
+    """Of 6 walks 6, 0 and then 6 again: intervals 0..39 and 61..100 %; 2 of 6, 10..70 %, may be chance."""
+    varied = Axis("grf_pulse", "magnitude", "N", 40.0, 60.0, 10.0, "larger")
+    rows = [
+        dict(zip(LEVEL_COLUMNS, (value, "tde", 6, count, *rate(count, 6)[:3]), strict=True))
+        for value, count in ((40.0, 6), (50.0, 0), (60.0, survived))
+    ]
+    found = frontier_of(varied, ["tde"], rows, 0.9, None, complete=True)
+    assert rising_note(found) == ""  # a bisection stops at the first level that is not survived
+    half = pd.DataFrame([("tde", 45.0, 40.0, 50.0, 6)], columns=["controller", "half", "low", "high", "episodes"])
+    note = rising_note(dataclasses.replace(found, half=half))
+    assert said in note
+    assert bool(note) == bool(said)
 
 
 def test_episodes_that_were_not_run_count_for_nothing() -> None:

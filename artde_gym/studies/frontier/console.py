@@ -10,7 +10,7 @@ from rich.text import Text
 
 from artde_gym.evaluation.fitting_table import FittingTable
 from artde_gym.studies.frontier.half import half_text
-from artde_gym.studies.frontier.result import Frontier, direction_note, value_text
+from artde_gym.studies.frontier.result import Frontier, direction_note, rising_note, value_text
 
 
 def print_frontier(found: Frontier, console: Console) -> None:
@@ -67,6 +67,8 @@ def _print_grid(found: Frontier, console: Console) -> None:
     )
     for row in found.half.to_dict(orient="records"):
         console.print(f"  {row['controller']}: {half_text(row, found.axis, unit=True)}")
+    if note := rising_note(found):
+        console.print(note)
 
 
 def _falls(row: dict[Any, Any] | None) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -69,3 +70,22 @@ def direction_note(found: Frontier) -> str:
         f"More survive the hardest level than the easiest one under {', '.join(rising)}: are {other} values the harder "
         f"ones (--harder {other})?"
     )
+
+
+def rising_note(found: Frontier) -> str:
+    """Say where survival rises from a level of a grid to the next harder one beyond chance; "" if nowhere.
+
+    Beyond chance means that the 95 % intervals of the two levels do not overlap. A half point, which is that of a
+    monotone fit, and a frontier, which ends at the first level not survived, both hide such a rise.
+    """
+    if found.half is None:
+        return ""
+    unit = "" if found.axis.unit == "1" else f" {found.axis.unit}"
+    levels = found.levels.set_index(["controller", "value"])
+    rises = [
+        f"{name} from {easier:g} to {harder:g}{unit}"
+        for name in found.half["controller"]
+        for easier, harder in itertools.pairwise(found.axis.levels)
+        if levels["high"][name, easier] < levels["low"][name, harder]
+    ]
+    return f"Survival rises beyond chance, which half points hide: {', '.join(rises)}." if rises else ""
