@@ -76,7 +76,7 @@ class ActionError(ArtdeGymError):
     """An action with the wrong shape or a value that is not finite."""
 
     environment = 0
-    """Number of the first environment of a vector to which it was given."""
+    """Number of the first environment of a vector that refused it."""
 
 
 class DisturbanceError(ArtdeGymError):

@@ -74,9 +74,9 @@ def vectorized_by(vectorized: bool, backend: str | None) -> bool:
     """
     if backend not in (None, "single", "batch"):
         raise OptionError("--backend", backend, "'batch', 'single'; better use --vectorized")
-    return renamed_option(
-        "--backend", None if backend is None else backend == "batch", "--vectorized", vectorized, False
-    )
+    if backend is None:
+        return vectorized
+    return renamed_option("--backend", backend, "--vectorized", "batch" if vectorized else "", "") == "batch"
 
 
 def names(option: str, text: str) -> list[str]:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from artde_gym.errors import ActionError
 from artde_gym.evaluation.metrics import Metrics, Span, events_of, payload_of
 from artde_gym.info import fall_reason
 from artde_gym.motion.motion import HZ, Motion, Pose
@@ -44,6 +45,7 @@ def run_episode(
     record_hz: float = 100.0,
     phases: Sequence[Span] = (),
     on_progress: Callable[[float], None] | None = None,
+    label: str = "",
 ) -> Episode:
     """Run `policy` in `env` from a seeded reset to the end.
 
@@ -54,6 +56,10 @@ def run_episode(
         record_hz: rate of the traces, at most the control rate; infinite for every sample.
         phases: see `Metrics`.
         on_progress: called with the simulated time (s), about once per simulated second.
+        label: of the episode, for errors; its seed if there is none.
+
+    Raises:
+        ActionError: for an action that the environment refuses, with the episode.
     """
     plant = env.unwrapped
     period: float = plant.control_period
@@ -77,7 +83,10 @@ def run_episode(
         count = len(observations)
         if diagnose is not None and (count - 1) % looks == 0:
             diagnostics.append(copied(diagnose(state)))
-        observation, reward, terminated, truncated, info = env.step(action)
+        try:
+            observation, reward, terminated, truncated, info = env.step(action)
+        except ActionError as error:
+            raise error.within(label or f"seed {seed}") from error
         total += float(reward)
         observations.append(np.array(observation))
         if count % tells == 0:

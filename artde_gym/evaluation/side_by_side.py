@@ -34,14 +34,15 @@ class SideBySide:
         kinds: of each row; those of one kind are computed at once, too, if they differ in gains alone and their class
             has `stacked` (`controllers.policies.Policy`).
         size: number of components of an action.
+        labels: of each row, for errors; its number without.
 
     Attributes:
         parts: each policy that is computed, with its rows.
     """
 
-    def __init__(self, policies: Sequence[Policy], kinds: Sequence[str], size: int) -> None:
+    def __init__(self, policies: Sequence[Policy], kinds: Sequence[str], size: int, labels: Sequence[str] = ()) -> None:
         self.parts = [part for group in _rows_by(kinds) for part in _parts(policies, group)]
-        self._size = size
+        self._size, self.labels = size, labels or [f"row {i}" for i in range(len(policies))]
 
     def predict(
         self, observation: Any, state: _State | None = None, episode_start: Any = None, deterministic: bool = True
@@ -68,8 +69,7 @@ class SideBySide:
             try:
                 self._take(own, len(seen), state.actions, rows)
             except ActionError as error:
-                error.environment = int(np.arange(len(observation))[rows][0])
-                raise
+                raise error.within(self.labels[int(np.arange(len(self.labels))[rows][0])]) from error
         return state.actions, state
 
     def _take(self, own: Any, count: int, actions: Array, rows: Rows) -> None:

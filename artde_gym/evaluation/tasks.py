@@ -7,7 +7,6 @@ import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
-from artde_gym.errors import ActionError
 from artde_gym.evaluation.cells import Cell, shared_kwargs, single_of, vector_of
 from artde_gym.evaluation.gains import policy_for
 from artde_gym.evaluation.registered import METRICS, require_metrics
@@ -69,6 +68,11 @@ class Task(NamedTuple):
     def controller(self) -> str:
         """The controllers, separated by commas."""
         return ", ".join(dict.fromkeys(case.controller for case in self.cases))
+
+    def label(self, number: int) -> str:
+        """Name the task's episode at index `number` in errors."""
+        case = self.cases[number]
+        return f"{case.controller} in {case.cell.name}, episode {self.episodes[number]}"
 
 
 class Update(NamedTuple):
@@ -203,27 +207,22 @@ def run_task(task: Task, on_progress: Callable[[float], None]) -> list[Episode]:
         ActionError: for an action that an environment refuses, with the controller and the episode.
     """
     require_metrics(task.metrics)
-    try:
-        return _run(task, on_progress)
-    except ActionError as error:
-        case, episode = task.cases[error.environment], task.episodes[error.environment]
-        raise error.within(f"{case.controller} in {case.cell.name}, episode {episode}") from error
-
-
-def _run(task: Task, on_progress: Callable[[float], None]) -> list[Episode]:
     recorded = {i for i, episode in enumerate(task.episodes) if episode < task.record_episodes}
     options: dict[str, Any] = {"record_hz": task.record_hz, "phases": task.cell.phases, "on_progress": on_progress}
     if task.vectorized:
         env, reset_options = vector_of(task.cells)
-        policies = _policies(task.cases, env)
+        policies = _policies(task, env)
         return run_vector(env, policies, task.seeds, options=reset_options, recorded=recorded, **options)
     env, reset_options = single_of(task.cell)
     policy = policy_for(task.cases[0].policy, env, task.cases[0].gains)
-    results = [run_episode(env, policy, seed, options=reset_options, **options) for seed in task.seeds]
+    results = [
+        run_episode(env, policy, seed, options=reset_options, label=task.label(i), **options)
+        for i, seed in enumerate(task.seeds)
+    ]
     return [result if i in recorded else Episode(result.row, {}) for i, result in enumerate(results)]
 
 
-def _policies(cases: Sequence[Case], env: Any) -> SideBySide:
+def _policies(task: Task, env: Any) -> SideBySide:
     """Build each controller's policy once; those of one registered name that differ in gains may be computed at once.
 
     Controllers that differ by name alone have a policy each: a network's last bits may depend on how many observations
@@ -231,14 +230,15 @@ def _policies(cases: Sequence[Case], env: Any) -> SideBySide:
     """
     made: dict[str, Policy] = {}
     policies, kinds = list[Policy](), list[str]()
-    for case in cases:
+    for case in task.cases:
         kind = case.policy.name if isinstance(case.policy, ControllerSpec) else str(id(case.policy))
         key = repr((case.controller, case.gains))
         if key not in made:
             made[key] = policy_for(case.policy, env, case.gains)
         policies.append(made[key])
         kinds.append(kind)
-    return SideBySide(policies, kinds, env.action_layout.size)
+    labels = [task.label(i) for i in range(len(policies))]
+    return SideBySide(policies, kinds, env.action_layout.size, labels)
 
 
 def labels_of(task: Task, number: int) -> dict[str, Any]:

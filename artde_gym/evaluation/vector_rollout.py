@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artde_gym.arrays import Array
+from artde_gym.errors import ActionError
 from artde_gym.evaluation.metrics import Span
 from artde_gym.evaluation.rollout import (
     PROGRESS_INTERVAL,
@@ -52,11 +53,15 @@ def run_vector(
         recorded: numbers of the episodes that leave traces.
         phases: see `Metrics`.
         on_progress: called with the simulated time (s), about once per simulated second.
+
+    Raises:
+        ActionError: for an action that the environment refuses, with the episode.
     """
     period: float = env.control_period
     report_every = max(1, round(PROGRESS_INTERVAL / period))
     if not isinstance(policy, SideBySide):
-        policy = SideBySide([policy] * len(seeds), [""] * len(seeds), env.action_layout.size)
+        labels = [f"seed {seed}" for seed in seeds]
+        policy = SideBySide([policy] * len(seeds), [""] * len(seeds), env.action_layout.size, labels)
 
     observation, info = env.reset(seed=list(seeds), options=options)
     disturbances = env.sampled_disturbances
@@ -72,7 +77,10 @@ def run_vector(
         action, state = policy.predict(observation, state=state, episode_start=episode_start, deterministic=True)
         for part, own in zip(parts, state.policies, strict=True):
             part.decide(k, own)
-        observation, reward, terminated, truncated, info = env.step(action)
+        try:
+            observation, reward, terminated, truncated, info = env.step(action)
+        except ActionError as error:
+            raise error.within(policy.labels[error.environment]) from error
         k += 1
         total += np.where(live, reward, 0.0)
         episode_start = terminated | truncated

@@ -62,6 +62,26 @@ def test_a_wrong_action_names_its_controller_and_episode(action: np.ndarray, pro
         evaluate(policies, scenario="Q1", episodes=2, vectorized=vectorized, env_kwargs={"duration": 0.1})
 
 
+class Planner(Broken):
+    """A policy that sends the wrong action to a vector of its own."""
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
+    ) -> tuple[Any, Any]:
+        if state == 2:
+            inner = gym.make_vec("QuadInfinity-Payload-v0", num_envs=10, duration=0.1, engine="numpy")
+            inner.reset(seed=0)
+            inner.step(np.concatenate([np.zeros((9, 4)), self.action[None]]))
+        return super().predict(observation, state)
+
+
+@pytest.mark.parametrize("vectorized", [False, True])
+def test_a_wrong_action_of_a_policys_own_environment_is_not_the_episodes(vectorized: bool) -> None:
+    planner = Planner(np.full(4, np.nan))
+    with pytest.raises(ActionError, match=r"^action of environment 9 is"):
+        evaluate({"broken": planner}, scenario="Q1", episodes=2, vectorized=vectorized, env_kwargs={"duration": 0.1})
+
+
 def test_a_warning_is_one_line_once(tmp_path: Path) -> None:
     late = '{"push": [{"magnitude": 1.0, "start": 5.0}]}'
     words = ["evaluate", *FLIGHT, "--disturbances", late, "--episodes", "2", "--workers", "2", "--out", str(tmp_path)]
