@@ -21,6 +21,7 @@ from artde_gym.palette import Style
 
 _ASSETS = Path(__file__).parent / "assets"
 COLUMNS = 220
+LETTER = 7  # width of a letter of a legend, rather too wide than too narrow
 LEFT, RIGHT, TOP, BOTTOM = 64, 12, 12, 40  # margins of the drawing, in its own units
 TICKS = 5
 
@@ -109,6 +110,7 @@ class Chart:
     ) -> None:
         self.x, self.y, self._name = x, y, name
         self.width, self.height = width, height
+        self._beside = 0  # width of a legend
         self._parts = [self._frame(names)] if frame else []
 
     def line(self, x: ArrayLike, y: ArrayLike, look: Style, *, text: str = "", kind: str = "line") -> None:
@@ -210,26 +212,29 @@ class Chart:
         self._parts.append(f'<text x="{across:.1f}" y="{up:.1f}" text-anchor="middle">{escape(text)}</text>')
 
     def legend(self, shown: Mapping[str, Style]) -> None:
-        """Name the styles in the lower left corner, for a chart that stands alone."""
-        for i, (name, look) in enumerate(reversed(list(shown.items()))):
-            up = self.height - BOTTOM - 14 - 16 * i
+        """Name the styles beside the drawing, for a chart that stands alone."""
+        for i, (name, look) in enumerate(shown.items()):
+            down = 20 + 16 * i
             shape = SHAPES.get(look.marker, SHAPES["o"])
             self._parts.append(
-                f'<path class="marker" style="--c:{look.color}" transform="translate({LEFT + 14} {up})" d="{shape}"/>'
-                f'<text x="{LEFT + 24}" y="{up + 4}">{escape(name)}</text>'
+                f'<path class="marker" style="--c:{look.color}" transform="translate({self.width + 6} {down})" '
+                f'd="{shape}"/><text x="{self.width + 16}" y="{down + 4}">{escape(name)}</text>'
             )
+        self._beside = 20 + LETTER * max(map(len, shown), default=0)
 
     def svg(self) -> str:
         name = escape(self._name, quote=True)
         return (
-            f'<svg role="img" aria-label="{name}" viewBox="0 0 {self.width} {self.height}"><title>{name}</title>'
+            f'<svg role="img" aria-label="{name}" viewBox="0 0 {self.width + self._beside} {self.height}"><title>{name}</title>'
             f"{''.join(self._parts)}</svg>"
         )
 
     def file(self) -> str:
         """Return the chart as a standalone SVG file, in the colors of the reports."""
         style = "".join((_ASSETS / name).read_text(encoding="utf-8") for name in ("chart.css", "style.css"))
-        size = f'xmlns="http://www.w3.org/2000/svg" width="{2 * self.width}" height="{2 * self.height}"'
+        size = (
+            f'xmlns="http://www.w3.org/2000/svg" width="{2 * (self.width + self._beside)}" height="{2 * self.height}"'
+        )
         whole = self.svg().replace("<svg ", f"<svg {size} ", 1)
         return whole.replace("</title>", f"</title><style><![CDATA[{style}]]></style>", 1)
 

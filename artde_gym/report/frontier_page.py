@@ -116,7 +116,7 @@ def _margins(found: Frontier) -> dict[str, str]:
     """Tell of each controller that was run where half survive, in a grid, or its frontier."""
     if found.half is None:
         return {row["controller"]: value_text(row, found.axis.unit) for row in _records(found.table)}
-    return {row["controller"]: f"half: {half_text(row, found.axis, unit=True)}" for row in _records(found.half)}
+    return {row["controller"]: f"half at {half_text(row, found.axis, unit=True)}" for row in _records(found.half)}
 
 
 def _half(found: Frontier) -> list[str]:

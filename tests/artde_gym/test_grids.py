@@ -321,6 +321,6 @@ def test_command_with_scenarios_and_figures(tmp_path: Path) -> None:
     for name in ("S1", "S2"):
         drawn = (tmp_path / f"curve-{name}.svg").read_text()
         assert drawn.startswith("<svg")
-        assert "tde: half: &gt; 60 (60..&gt; 60) N" in drawn
+        assert "tde: half at &gt; 60 (60..&gt; 60) N" in drawn
         assert "wanted" not in drawn  # of a bisection
         assert (tmp_path / "run" / name / "half.csv").exists()
