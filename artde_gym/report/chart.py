@@ -224,10 +224,8 @@ class Chart:
 
     def svg(self) -> str:
         name = escape(self._name, quote=True)
-        return (
-            f'<svg role="img" aria-label="{name}" viewBox="0 0 {self.width + self._beside} {self.height}"><title>{name}</title>'
-            f"{''.join(self._parts)}</svg>"
-        )
+        box = f"0 0 {self.width + self._beside} {self.height}"
+        return f'<svg role="img" aria-label="{name}" viewBox="{box}"><title>{name}</title>{"".join(self._parts)}</svg>'
 
     def file(self) -> str:
         """Return the chart as a standalone SVG file, in the colors of the reports."""
