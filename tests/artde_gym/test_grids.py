@@ -23,7 +23,7 @@ from artde_gym.evaluation.tasks import Update
 from artde_gym.report import frontier_page
 from artde_gym.studies import Frontier, frontier
 from artde_gym.studies.frontier.axis import Axis, Harder
-from artde_gym.studies.frontier.half import half_difference, half_point, half_text
+from artde_gym.studies.frontier.half import COLUMNS, half_difference, half_point, half_text
 from artde_gym.studies.frontier.result import direction_note, rising_note
 from artde_gym.studies.frontier.standard import standard_test
 from artde_gym.studies.frontier.table import LEVEL_COLUMNS, frontier_of
@@ -147,6 +147,40 @@ def test_differences_are_paired() -> None:
     assert same.low < 0.0 == same.value < same.high
     both = half_difference(steps([99.0] * 4), steps([99.0] * 4), GRID)
     assert both.value == 0.0
+
+
+# ---------------------------------------------------------------- what a report says of a curve
+
+M_BAR = Axis("gains", "m_bar", "kg m^2", 0.01, 0.21, 0.04, "larger")
+
+
+def curves(varied: Axis, survived: dict[str, list[int]], episodes: int = 3) -> Frontier:
+    """A grid in which so many of the episodes survive the levels, easiest first; the last levels may be missing."""
+    rows = [
+        dict(zip(LEVEL_COLUMNS, (value, name, episodes, count, *rate(count, episodes)[:3]), strict=True))
+        for name, counts in survived.items()
+        for value, count in zip(varied.levels, counts, strict=False)
+    ]
+    whole = {name: counts for name, counts in survived.items() if len(counts) == len(varied.levels)}
+    tables = {name: [[i < count for count in counts] for i in range(episodes)] for name, counts in whole.items()}
+    half = pd.DataFrame([(name, *half_point(table, varied.levels)) for name, table in tables.items()], columns=COLUMNS)
+    return dataclasses.replace(frontier_of(varied, list(survived), rows, 0.9, None, whole == survived), half=half)
+
+
+@pytest.mark.parametrize(
+    ("survived", "headline"),
+    [
+        (
+            {"tde": [0, 3, 3, 0, 0, 0]},
+            "No controller survives the easiest level of gains.m_bar, 0.01 kg m^2, in 90 % of the episodes.",
+        ),
+        ({"tde": [3, 3], "artde": [2]}, "No frontier of gains.m_bar is found yet."),
+        ({"tde": [3, 0], "artde": [3]}, "tde goes farthest so far in gains.m_bar: 0.01 kg m^2 (artde open)."),
+        ({"tde": [3, 0, 0, 0, 0, 0]}, "tde goes farthest in gains.m_bar: 0.01 kg m^2."),
+    ],
+)
+def test_headline_is_no_more_than_the_levels_say(survived: dict[str, list[int]], headline: str) -> None:
+    assert frontier_page.answer(curves(M_BAR, survived))[0] == headline
 
 
 # ---------------------------------------------------------------- claims on grids
