@@ -13,6 +13,7 @@ import gymnasium as gym
 import numpy as np
 import pandas as pd
 import pytest
+from rich.console import Console
 from typer.testing import CliRunner
 
 from artde_gym.cli import app
@@ -23,6 +24,7 @@ from artde_gym.evaluation.tasks import Update
 from artde_gym.report import frontier_page
 from artde_gym.studies import Frontier, frontier
 from artde_gym.studies.frontier.axis import Axis, Harder
+from artde_gym.studies.frontier.console import print_frontier
 from artde_gym.studies.frontier.half import COLUMNS, half_difference, half_point, half_text
 from artde_gym.studies.frontier.result import direction_note, rising_note
 from artde_gym.studies.frontier.standard import standard_test
@@ -181,6 +183,26 @@ def curves(varied: Axis, survived: dict[str, list[int]], episodes: int = 3) -> F
 )
 def test_headline_is_no_more_than_the_levels_say(survived: dict[str, list[int]], headline: str) -> None:
     assert frontier_page.answer(curves(M_BAR, survived))[0] == headline
+
+
+@pytest.mark.parametrize(
+    ("survived", "rises"),
+    [
+        ([0, 3, 3, 0, 0, 0], "from 0.01 to 0.05"),  # of 3 episodes: no intervals are disjoint
+        ([3, 1, 2, 0, 0, 0], "from 0.05 to 0.09"),
+        ([3, 2, 3, 1, 1, 0], ""),
+        ([1, 0, 1, 0, 0, 0], ""),
+    ],
+)
+def test_a_rise_across_one_half_is_told(survived: list[int], rises: str) -> None:
+    grid = curves(M_BAR, {"tde": survived})
+    note = f"Survival rises, which half points hide: tde {rises} kg m^2." if rises else ""
+    assert rising_note(grid) == note
+    assert ([line for line in frontier_page.answer(grid)[1] if "rises" in line] == [note]) == bool(rises)
+    console = Console(width=200)
+    with console.capture() as printed:
+        print_frontier(grid, console)
+    assert ("rises" in printed.get()) == bool(rises)
 
 
 # ---------------------------------------------------------------- claims on grids

@@ -14,9 +14,8 @@ from scipy.optimize import isotonic_regression
 from artde_gym.arrays import Array
 from artde_gym.evaluation.statistics import CONFIDENCE, Estimate
 from artde_gym.studies.frontier.axis import Axis
-from artde_gym.studies.frontier.result import Frontier
+from artde_gym.studies.frontier.result import HALF, Frontier
 
-HALF = 0.5
 RESAMPLES = 2000
 COLUMNS = ["controller", "half", "low", "high", "episodes"]
 
@@ -24,7 +23,8 @@ COLUMNS = ["controller", "half", "low", "high", "episodes"]
 def half_point(survived: ArrayLike, grid: Sequence[float]) -> Estimate:
     """Estimate where survival crosses one half, with a bootstrap interval over seeds.
 
-    Survival is made to fall from level to level (isotonic regression) and is linear in between. Seeds are drawn anew
+    Survival is made to fall from level to level (isotonic regression) and is linear in between; where it rises, see
+    `artde_gym.studies.frontier.result.rising_note`. Seeds are drawn anew
     with all their levels, since these share a seed's disturbances. A sample says between which two levels it crosses,
     so that the interval is never narrower than the grid: it runs from the 2.5 % quantile of the lower ones of those
     levels to the 97.5 % quantile of the upper ones.
