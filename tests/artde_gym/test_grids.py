@@ -148,7 +148,7 @@ def test_differences_are_paired() -> None:
     same = half_difference(steps(edges.tolist()), steps(edges.tolist()), GRID)
     assert same.low < 0.0 == same.value < same.high
     both = half_difference(steps([99.0] * 4), steps([99.0] * 4), GRID)
-    assert both.value == 0.0
+    assert math.isnan(both.value)
 
 
 # ---------------------------------------------------------------- what a report says of a curve
@@ -234,6 +234,14 @@ def test_who_survives_more(edges: dict[str, float], outcome: str) -> None:
     verdict = outlasts(("artde", "atde", "tde"))(found({name: [edge] * 20 for name, edge in edges.items()}))
     assert verdict.outcome == outcome
     assert "artde beyond atde by " in verdict.measured
+
+
+def test_an_unknown_gap_is_no_number_and_a_number_has_no_unit() -> None:
+    verdict = outlasts(("artde", "tde"))(found({"artde": [99.0] * 3, "tde": [99.0] * 3}))
+    assert (verdict.outcome, verdict.measured) == ("undecided", "artde beyond tde by an unknown amount")
+    share = Axis("grf_pulse", "share", "1", 20.0, 60.0, 2.0, "larger")
+    grid = dataclasses.replace(found({"artde": [40.0] * 3, "tde": [30.0] * 3}), axis=share)
+    assert outlasts(("artde", "tde"))(grid).measured == "artde beyond tde by +10.0 (+8..+12)"
 
 
 def test_who_survives_more_needs_all_of_them() -> None:

@@ -50,8 +50,8 @@ def half_point(survived: ArrayLike, grid: Sequence[float]) -> Estimate:
 def half_difference(first: ArrayLike, second: ArrayLike, grid: Sequence[float]) -> Estimate:
     """By how much the half point of `first` exceeds that of `second` on the same seeds; as for `half_point`.
 
-    The interval runs from the smallest difference that the brackets allow to the largest. An end is infinite, or NaN,
-    where the grid does not reach far enough.
+    The interval runs from the smallest difference that the brackets allow to the largest. An end is infinite where the
+    grid does not reach far enough; the value is NaN where it reaches neither half point, or one does not exist.
     """
     tables = [np.asarray(table, dtype=np.float64) for table in (first, second)]
     values = [half_point(table, grid).value for table in tables]
@@ -59,7 +59,7 @@ def half_difference(first: ArrayLike, second: ArrayLike, grid: Sequence[float]) 
         return Estimate(math.nan, math.nan, math.nan, len(tables[0]))
     (low, high), (other_low, other_high) = (_brackets(table, grid).T for table in tables)
     with np.errstate(invalid="ignore"):
-        value = values[0] - values[1] if values[0] != values[1] else 0.0
+        value = values[0] - values[1]
         return Estimate(value, *_interval(low - other_high, high - other_low), len(tables[0]))
 
 

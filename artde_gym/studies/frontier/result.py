@@ -83,7 +83,7 @@ def rising_note(found: Frontier) -> str:
         return ""
     unit = "" if found.axis.unit == "1" else f" {found.axis.unit}"
     levels = found.levels.set_index(["controller", "value"])
-    rate, low, high = (levels[column] for column in ("rate", "low", "high"))
+    rate, low, high = (levels[column].to_dict() for column in ("rate", "low", "high"))
     rises = [
         f"{name} from {easier:g} to {harder:g}{unit}"
         for name in found.half["controller"]

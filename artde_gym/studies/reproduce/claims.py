@@ -242,7 +242,7 @@ def outlasts(names: Sequence[str]) -> Callable[[Frontier], Verdict]:
         known = [table for table in tables.values() if table is not None]
         gaps = [half_difference(first, second, levels) for first, second in itertools.pairwise(known)]
         measured = ", ".join(
-            f"{first} beyond {second} by {_gap(gap)} {found.axis.unit}"
+            f"{first} beyond {second} by {_gap(gap, found.axis.unit)}"
             for (first, second), gap in zip(itertools.pairwise(names), gaps, strict=True)
         )
         # an end of 0 counts: half points lie inside their brackets, and brackets that share only a level differ
@@ -343,5 +343,8 @@ def _interval(estimate: Estimate) -> str:
     return f"{estimate.value:+.1f}{span}"
 
 
-def _gap(gap: Estimate) -> str:
-    return f"{gap.value:+.1f} ({gap.low:+g}..{gap.high:+g})"
+def _gap(gap: Estimate, unit: str) -> str:
+    if np.isnan(gap.value):
+        return "an unknown amount"
+    span = f" ({gap.low:+g}..{gap.high:+g})"
+    return f"{gap.value:+.1f}{span}{'' if unit == '1' else f' {unit}'}"
