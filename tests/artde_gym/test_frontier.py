@@ -30,6 +30,7 @@ from artde_gym.studies.frontier.bisection import search
 from artde_gym.studies.frontier.result import value_text
 from artde_gym.studies.frontier.standard import standard_for, standard_test
 from artde_gym.studies.frontier.table import LEVEL_COLUMNS, TABLE_COLUMNS, frontier_of
+from controllers import GainError
 
 PUSH = "BipedPush-v0"
 QUADROTOR = "QuadInfinity-Payload-v0"
@@ -314,15 +315,28 @@ def test_folder_continuation_and_refusal(tmp_path: Path) -> None:
         ({"env_kwargs": {"durration": 1}}, OptionError, ["durration", "did you mean 'duration'"]),
         ({"env_kwargs": {"disturbances": {}}}, OptionError, ["env_kwargs", "disturbances"]),
         ({"vary": "speed", "low": 0.1, "high": 9.0}, OptionError, ["speed", "9"]),
+        ({"vary": "gains.m_bar", "low": 0.0, "high": 0.06, "tolerance": 0.03}, GainError, ["m_bar", "0"]),
+        (
+            {
+                "vary": "payload.detach_time",
+                "harder": "smaller",
+                "disturbances": {"payload": {"mass": 1, "attach_time": 1.5}},
+            },
+            DisturbanceError,
+            ["detach_time"],
+        ),
         ({"vary": "duration", "low": 0.2, "high": 0.3, "tolerance": 0.1}, OptionError, ["env_kwargs", "duration"]),
     ],
 )
 def test_bad_arguments_leave_no_folder_behind(
     arguments: dict[str, Any], error: type[Exception], words: list[str], tmp_path: Path
 ) -> None:
+    def refuse(value: float, update: Update) -> None:
+        raise AssertionError("an episode was begun")
+
     given_ = {"controllers": ["tde"], "vary": "payload.mass", **TINY, "env_kwargs": SHORT, **arguments}
     with pytest.raises(error) as caught:
-        frontier(env_id=PUSH, out=tmp_path / "run", **given_)
+        frontier(env_id=PUSH, out=tmp_path / "run", on_progress=refuse, **given_)
     for word in words:
         assert word in str(caught.value)
     assert not (tmp_path / "run").exists()

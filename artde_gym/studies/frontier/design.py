@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from artde_gym.errors import OptionError, suggest_names
-from artde_gym.evaluation.cells import Cell, validate_cell
+from artde_gym.evaluation.cells import Cell
 from artde_gym.evaluation.environments import arguments_of
 from artde_gym.evaluation.plan import Plan
 from artde_gym.studies.frontier.axis import GAINS, Axis
@@ -35,7 +35,8 @@ class Design:
         """Make a design from a plan with one cell; without disturbances of its own, it is the robot's standard test.
 
         Raises:
-            UnknownNameError, OptionError, DisturbanceError: if the test, or an end of the axis, is not allowed.
+            UnknownNameError, OptionError, DisturbanceError, GainError: if the test, or an end of the axis, is not
+                allowed.
         """
         if not (isinstance(survival, (int, float)) and 0 < survival <= 1):
             raise OptionError("survival", survival, "above 0 up to 1")
@@ -51,9 +52,8 @@ class Design:
             )
         design = cls(axis, survival, disturbances, arguments)
         for end in (axis.levels[0], axis.levels[-1]):
-            placed = design.at(end, cell)
-            if axis.kind is None:  # only the environment knows the argument's range: let it check at once
-                validate_cell(plan.vectorized, placed)
+            gains = design.gains_at(end, plan)
+            dataclasses.replace(plan, cells=(design.at(end, cell),), gains=gains).try_out()
         return design
 
     def gains_at(self, value: float, plan: Plan) -> Mapping[str, dict[str, Any]]:
