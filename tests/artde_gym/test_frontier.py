@@ -317,13 +317,9 @@ def test_folder_continuation_and_refusal(tmp_path: Path) -> None:
         ({"vary": "speed", "low": 0.1, "high": 9.0}, OptionError, ["speed", "9"]),
         ({"vary": "gains.m_bar", "low": 0.0, "high": 0.06, "tolerance": 0.03}, GainError, ["m_bar", "0"]),
         (
-            {
-                "vary": "payload.detach_time",
-                "harder": "smaller",
-                "disturbances": {"payload": {"mass": 1, "attach_time": 1.5}},
-            },
-            DisturbanceError,
-            ["detach_time"],
+            {"vary": "gains.m_bar", "gains": {"tde": {"m_bar": 0.05}}},
+            OptionError,
+            ["gain of 'tde'", "m_bar", "is varied"],
         ),
         ({"vary": "duration", "low": 0.2, "high": 0.3, "tolerance": 0.1}, OptionError, ["env_kwargs", "duration"]),
     ],

@@ -44,6 +44,9 @@ class Design:
         arguments = dict(cell.kwargs)
         disturbances = arguments.pop("disturbances", None)
         _check_arguments(cell.env_id, plan.vectorized, axis, arguments)
+        for name, gains in plan.gains.items():
+            if axis.kind == GAINS and axis.name in gains:
+                raise OptionError(f"gain of {name!r}", axis.name, "leave it out", "is varied")
         if disturbances is None:
             disturbances, arguments = standard_test(cell.env_id, axis.path, arguments, scenario)
         elif scenario is not None:
