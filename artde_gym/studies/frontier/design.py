@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from artde_gym.errors import OptionError, suggest_names
+from artde_gym.errors import DisturbanceError, OptionError, suggest_names
 from artde_gym.evaluation.cells import Cell
 from artde_gym.evaluation.environments import arguments_of
 from artde_gym.evaluation.plan import Plan
@@ -47,6 +47,7 @@ class Design:
         for name, gains in plan.gains.items():
             if axis.kind == GAINS and axis.name in gains:
                 raise OptionError(f"gain of {name!r}", axis.name, "leave it out", "is varied")
+        is_standard = disturbances is None
         if disturbances is None:
             disturbances, arguments = standard_test(cell.env_id, axis.path, arguments, scenario)
         elif scenario is not None:
@@ -56,7 +57,13 @@ class Design:
         design = cls(axis, survival, disturbances, arguments)
         for end in (axis.levels[0], axis.levels[-1]):
             gains = design.gains_at(end, plan)
-            dataclasses.replace(plan, cells=(design.at(end, cell),), gains=gains).try_out()
+            try:
+                dataclasses.replace(plan, cells=(design.at(end, cell),), gains=gains).try_out()
+            except DisturbanceError as error:
+                if not is_standard:
+                    raise
+                remedy = "pass `disturbances`, or a scenario that has the whole of it"
+                raise OptionError("vary", axis.path, remedy, f"makes no standard test ({error})") from error
         return design
 
     def gains_at(self, value: float, plan: Plan) -> Mapping[str, dict[str, Any]]:
