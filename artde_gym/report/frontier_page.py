@@ -121,7 +121,7 @@ def _margins(found: Frontier) -> dict[str, str]:
 
 
 def _half(found: Frontier) -> list[str]:
-    if found.half is None:
+    if found.half is None or found.half.empty:
         return []
     unit = "" if found.axis.unit == "1" else f" ({found.axis.unit})"
     heads = ["controller", f"half survive at{unit}"]

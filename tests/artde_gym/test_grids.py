@@ -139,6 +139,44 @@ def test_episodes_that_were_not_run_count_for_nothing() -> None:
     assert half_point(part, GRID)[:3] == half_point(whole, GRID)[:3]
 
 
+def test_a_single_episode_has_no_interval_and_none_has_no_half_point() -> None:
+    grid, one = [1.0, 2.0, 3.0], [[1.0, 1.0, 0.0]]
+    half, low, high, count = half_point(one, grid)
+    assert (half, count) == (2.5, 1)
+    assert np.isnan([low, high]).all()
+    assert half_point([*one, [1.0, math.nan, math.nan]], grid)[3] == 1  # the fewest of a level
+    assert half_text({"half": half, "low": low, "high": high}, M_BAR) == "2.5"
+    gap = half_difference(one, [[1.0, 0.0, 0.0]], grid)
+    assert (gap.value, gap.n, np.isnan(gap[1:3]).all()) == (1.0, 1, True)
+    verdict = outlasts(("artde", "tde"))(found({"artde": [40.0], "tde": [30.0]}))
+    assert (verdict.outcome, verdict.measured) == ("undecided", "artde beyond tde by +10 N")
+    for none in ([], np.empty((0, 3)), [[1.0, 0.0, math.nan]]):
+        assert np.isnan(half_point(none, grid)[:3]).all()
+        assert half_point(none, grid).n == 0
+
+
+@pytest.mark.parametrize(
+    ("half", "low", "step", "text"),
+    [
+        (1001.0, 1000.0, 2.0, "1001 (1000..1002)"),
+        (41.2345, 40.0, 2.0, "41.2 (40..42)"),
+        (0.0123, 0.01, 0.01, "0.0123 (0.01..0.02)"),
+        (99999.5, 99999.0, 1.0, "99999.5 (99999..100000)"),
+    ],
+)
+def test_a_half_point_has_the_digits_of_its_grid(half: float, low: float, step: float, text: str) -> None:
+    varied = Axis("gains", "k_p", "1", low, low + step, step, "larger")
+    assert half_text({"half": half, "low": low, "high": low + step}, varied) == text
+
+
+def test_numbers_of_a_fine_grid_are_not_rounded_away() -> None:
+    half = half_point([[0.0, 1.0, 1.0, 0.0, 0.0, 0.0]] * 3, M_BAR.levels)
+    assert half.value == 0.1  # not 0.100000000000015
+    fine = Axis("gains", "m_bar", "kg m^2", 0.02, 0.06, 0.002, "larger")
+    grid = dataclasses.replace(found({"artde": [40.0] * 3, "tde": [30.0] * 3}), axis=fine)
+    assert outlasts(("artde", "tde"))(grid).measured == "artde beyond tde by +0.01 (+0.008..+0.012) kg m^2"
+
+
 def test_differences_are_paired() -> None:
     """Each seed survives 6 N more under the first: the seeds' own scatter of 10 N drops out of the difference."""
     edges = np.random.default_rng(1).uniform(28, 42, 30)
@@ -154,6 +192,25 @@ def test_differences_are_paired() -> None:
 # ---------------------------------------------------------------- what a report says of a curve
 
 M_BAR = Axis("gains", "m_bar", "kg m^2", 0.01, 0.21, 0.04, "larger")
+
+
+def printed_by(grid: Frontier) -> str:
+    console = Console(width=200)
+    with console.capture() as printed:
+        print_frontier(grid, console)
+    return printed.get()
+
+
+def test_an_interrupted_grid_says_between_how_many_episodes_it_has() -> None:
+    grid = curves(M_BAR, {"tde": [2, 0, 0, 0, 0, 0]}, episodes=2)
+    grid.levels.loc[3:, "episodes"] = 1
+    assert "of 1 to 2 seeded episodes" in printed_by(grid)
+
+
+def test_without_a_whole_grid_there_is_no_heading_of_half_points() -> None:
+    grid = curves(M_BAR, {"tde": [3, 3]})
+    assert "Half of" not in printed_by(grid)
+    assert not any("Half points" in part for part in frontier_page.parts(grid))
 
 
 def curves(varied: Axis, survived: dict[str, list[int]], episodes: int = 3) -> Frontier:
@@ -199,10 +256,7 @@ def test_a_rise_across_one_half_is_told(survived: list[int], rises: str) -> None
     note = f"Survival rises, which half points hide: tde {rises} kg m^2." if rises else ""
     assert rising_note(grid) == note
     assert ([line for line in frontier_page.answer(grid)[1] if "rises" in line] == [note]) == bool(rises)
-    console = Console(width=200)
-    with console.capture() as printed:
-        print_frontier(grid, console)
-    assert ("rises" in printed.get()) == bool(rises)
+    assert ("rises" in printed_by(grid)) == bool(rises)
 
 
 # ---------------------------------------------------------------- claims on grids
@@ -241,7 +295,7 @@ def test_an_unknown_gap_is_no_number_and_a_number_has_no_unit() -> None:
     assert (verdict.outcome, verdict.measured) == ("undecided", "artde beyond tde by an unknown amount")
     share = Axis("grf_pulse", "share", "1", 20.0, 60.0, 2.0, "larger")
     grid = dataclasses.replace(found({"artde": [40.0] * 3, "tde": [30.0] * 3}), axis=share)
-    assert outlasts(("artde", "tde"))(grid).measured == "artde beyond tde by +10.0 (+8..+12)"
+    assert outlasts(("artde", "tde"))(grid).measured == "artde beyond tde by +10 (+8..+12)"
 
 
 def test_who_survives_more_needs_all_of_them() -> None:
@@ -376,11 +430,11 @@ def test_gains_are_varied(tmp_path: Path) -> None:
 
 def test_command_with_scenarios_and_figures(tmp_path: Path) -> None:
     arguments = ["frontier", "--vary", "grf_pulse.magnitude", "--grid", "--scenario", "S1,S2", "--controllers", "tde"]
-    arguments += ["--low", "20", "--high", "60", "--tolerance", "40", "--episodes", "1", "--workers", "1"]
+    arguments += ["--low", "20", "--high", "60", "--tolerance", "40", "--episodes", "2", "--workers", "1"]
     arguments += ["--env-kwargs", json.dumps(SHORT), "--out", str(tmp_path / "run")]
     outcome = CliRunner().invoke(app, [*arguments, "--figure", str(tmp_path / "curve.svg")])
     assert outcome.exit_code == 0, outcome.output
-    for word in ("falls at (N)", "0/1", "tde: > 60", "S2"):
+    for word in ("falls at (N)", "of 2 seeded", "0/2", "tde: > 60", "S2"):
         assert word in outcome.output
     for name in ("S1", "S2"):
         drawn = (tmp_path / f"curve-{name}.svg").read_text()

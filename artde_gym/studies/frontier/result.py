@@ -33,7 +33,7 @@ class Frontier:
         folder: the results folder, if they are stored.
         complete: False if the search was interrupted.
         half: of a grid, one row a controller: the value at which `half` of the episodes are survived with its 95 %
-            interval `low`, `high`, over so many `episodes` a level; see `artde_gym.studies.frontier.half`.
+            interval `low`, `high`, over at least so many `episodes` a level; see `artde_gym.studies.frontier.half`.
         episodes: of a grid that has just been run, those of all levels, whose numbers are the scenarios.
     """
 
