@@ -46,19 +46,20 @@ def answer(found: Frontier) -> tuple[str, list[str]]:
     axis, rows = found.axis, _records(found.table)
     known = [row for row in rows if math.isfinite(row["frontier"]) and row["relation"] in ("=", ">=", "<=")]
     lines = [_sentence(row, found) for row in rows]
-    if note := direction_note(found):
-        lines.append(note)
-    if rises := rising_note(found):
-        lines.append(rises)
-    if not known and note:
-        return f"No controller survives the easiest level of {axis.path}.", lines
+    lines += [note for note in (direction_note(found), rising_note(found)) if note]
+    is_open = any(not row["relation"] for row in rows)
+    if not known and is_open:
+        return f"No frontier of {axis.path} is found yet.", lines
     if not known:
-        return f"No controller survives {axis.path} at any level that was tried.", lines
+        easiest = value_text({"relation": "=", "frontier": axis.levels[0]}, axis.unit)
+        wanted = f"{100 * found.survival:g} % of the episodes"
+        return f"No controller survives the easiest level of {axis.path}, {easiest}, in {wanted}.", lines
     sign = 1 if axis.harder == "larger" else -1
     best = max(sign * row["frontier"] for row in known)
     first = [row["controller"] for row in known if sign * row["frontier"] == best]
     reach = value_text(next(row for row in known if row["controller"] == first[0]), axis.unit)
-    head = f"{' and '.join(first)} {'go' if len(first) > 1 else 'goes'} farthest in {axis.path}: {reach}"
+    goes = f"{'go' if len(first) > 1 else 'goes'} farthest{' so far' if is_open else ''}"
+    head = f"{' and '.join(first)} {goes} in {axis.path}: {reach}"
     others = [f"{row['controller']} {value_text(row, axis.unit)}" for row in rows if row["controller"] not in first]
     return head + (f" ({'; '.join(others)})." if others else "."), lines
 
@@ -120,7 +121,7 @@ def _margins(found: Frontier) -> dict[str, str]:
 
 
 def _half(found: Frontier) -> list[str]:
-    if found.half is None:
+    if found.half is None or found.half.empty:
         return []
     unit = "" if found.axis.unit == "1" else f" ({found.axis.unit})"
     heads = ["controller", f"half survive at{unit}"]

@@ -24,12 +24,14 @@ from artde_gym.evaluation.tasks import Update
 from artde_gym.kit import ROBOTS
 from artde_gym.palette import OTHERS, STYLES, styles
 from artde_gym.report.frontier_page import survival_chart
+from artde_gym.scenarios import scenario as find_scenario
 from artde_gym.studies import Frontier, frontier
 from artde_gym.studies.frontier.axis import Axis, axis
 from artde_gym.studies.frontier.bisection import search
 from artde_gym.studies.frontier.result import value_text
 from artde_gym.studies.frontier.standard import standard_for, standard_test
 from artde_gym.studies.frontier.table import LEVEL_COLUMNS, TABLE_COLUMNS, frontier_of
+from controllers import GainError
 
 PUSH = "BipedPush-v0"
 QUADROTOR = "QuadInfinity-Payload-v0"
@@ -177,7 +179,7 @@ def test_standard_test_is_the_same_but_for_what_is_varied() -> None:
     assert test("slope.pitch_deg")["friction"] == {"uniform": [0.7, 0.9]}
     (push,) = test("push.magnitude")["push"]
     assert (push["body"], push["duration"], push["start"]) == ("chest", 0.2, {"uniform": [5.0, 7.0]})
-    assert test("push.duration")["push"] == [push]
+    assert [push["body"] for push in test("push.duration")["push"]] == ["torso"]  # its magnitude is the scenario's
     assert test("wind.scale", QUADROTOR)["payload"]["detach_time"] == 35.0
     assert "push" not in test("wind.scale", QUADROTOR)
     assert test("push.magnitude", QUADROTOR)["push"][0]["body"] == "body"
@@ -187,6 +189,15 @@ def test_standard_test_is_the_same_but_for_what_is_varied() -> None:
         standard_test(PUSH, "push.magnitude", {"duration": 6})
     with pytest.raises(OptionError, match="an environment of artde_gym"):
         standard_test("CartPole-v1", "push.magnitude", {})
+
+
+def test_a_scenario_keeps_a_pulse_of_which_other_than_the_size_is_varied() -> None:
+    """A varied size completes the standard test's pulse, which replaces the scenario's."""
+    pulse = find_scenario("S2-GRF45").disturbances["grf_pulse"]
+    assert standard_test(PUSH, "grf_pulse.duration", {}, "S2-GRF45")[0]["grf_pulse"] == pulse
+    assert "share" not in standard_test(PUSH, "grf_pulse.magnitude", {}, "S2-GRF45")[0]["grf_pulse"]
+    options: dict[str, Any] = {**TINY, "disturbances": None, "env_kwargs": SHORT, "scenario": "S2-GRF45"}
+    assert frontier(["tde"], PUSH, "grf_pulse.duration", **options).complete
 
 
 @pytest.mark.once
@@ -314,15 +325,25 @@ def test_folder_continuation_and_refusal(tmp_path: Path) -> None:
         ({"env_kwargs": {"durration": 1}}, OptionError, ["durration", "did you mean 'duration'"]),
         ({"env_kwargs": {"disturbances": {}}}, OptionError, ["env_kwargs", "disturbances"]),
         ({"vary": "speed", "low": 0.1, "high": 9.0}, OptionError, ["speed", "9"]),
+        ({"vary": "gains.m_bar", "low": 0.0, "high": 0.06, "tolerance": 0.03}, GainError, ["m_bar", "0"]),
+        ({"vary": "grf_pulse.duration", "disturbances": None}, OptionError, ["share", "pass `disturbances`, or a"]),
+        (
+            {"vary": "gains.m_bar", "gains": {"tde": {"m_bar": 0.05}}},
+            OptionError,
+            ["gain of 'tde'", "m_bar", "is varied"],
+        ),
         ({"vary": "duration", "low": 0.2, "high": 0.3, "tolerance": 0.1}, OptionError, ["env_kwargs", "duration"]),
     ],
 )
 def test_bad_arguments_leave_no_folder_behind(
     arguments: dict[str, Any], error: type[Exception], words: list[str], tmp_path: Path
 ) -> None:
+    def refuse(value: float, update: Update) -> None:
+        raise AssertionError("an episode was begun")
+
     given_ = {"controllers": ["tde"], "vary": "payload.mass", **TINY, "env_kwargs": SHORT, **arguments}
     with pytest.raises(error) as caught:
-        frontier(env_id=PUSH, out=tmp_path / "run", **given_)
+        frontier(env_id=PUSH, out=tmp_path / "run", on_progress=refuse, **given_)
     for word in words:
         assert word in str(caught.value)
     assert not (tmp_path / "run").exists()

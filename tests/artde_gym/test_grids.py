@@ -13,6 +13,7 @@ import gymnasium as gym
 import numpy as np
 import pandas as pd
 import pytest
+from rich.console import Console
 from typer.testing import CliRunner
 
 from artde_gym.cli import app
@@ -23,7 +24,8 @@ from artde_gym.evaluation.tasks import Update
 from artde_gym.report import frontier_page
 from artde_gym.studies import Frontier, frontier
 from artde_gym.studies.frontier.axis import Axis, Harder
-from artde_gym.studies.frontier.half import half_difference, half_point, half_text
+from artde_gym.studies.frontier.console import print_frontier
+from artde_gym.studies.frontier.half import COLUMNS, half_difference, half_point, half_text
 from artde_gym.studies.frontier.result import direction_note, rising_note
 from artde_gym.studies.frontier.standard import standard_test
 from artde_gym.studies.frontier.table import LEVEL_COLUMNS, frontier_of
@@ -137,6 +139,44 @@ def test_episodes_that_were_not_run_count_for_nothing() -> None:
     assert half_point(part, GRID)[:3] == half_point(whole, GRID)[:3]
 
 
+def test_a_single_episode_has_no_interval_and_none_has_no_half_point() -> None:
+    grid, one = [1.0, 2.0, 3.0], [[1.0, 1.0, 0.0]]
+    half, low, high, count = half_point(one, grid)
+    assert (half, count) == (2.5, 1)
+    assert np.isnan([low, high]).all()
+    assert half_point([*one, [1.0, math.nan, math.nan]], grid)[3] == 1  # the fewest of a level
+    assert half_text({"half": half, "low": low, "high": high}, M_BAR) == "2.5"
+    gap = half_difference(one, [[1.0, 0.0, 0.0]], grid)
+    assert (gap.value, gap.n, np.isnan(gap[1:3]).all()) == (1.0, 1, True)
+    verdict = outlasts(("artde", "tde"))(found({"artde": [40.0], "tde": [30.0]}))
+    assert (verdict.outcome, verdict.measured) == ("undecided", "artde beyond tde by +10 N")
+    for none in ([], np.empty((0, 3)), [[1.0, 0.0, math.nan]]):
+        assert np.isnan(half_point(none, grid)[:3]).all()
+        assert half_point(none, grid).n == 0
+
+
+@pytest.mark.parametrize(
+    ("half", "low", "step", "text"),
+    [
+        (1001.0, 1000.0, 2.0, "1001 (1000..1002)"),
+        (41.2345, 40.0, 2.0, "41.2 (40..42)"),
+        (0.0123, 0.01, 0.01, "0.0123 (0.01..0.02)"),
+        (99999.5, 99999.0, 1.0, "99999.5 (99999..100000)"),
+    ],
+)
+def test_a_half_point_has_the_digits_of_its_grid(half: float, low: float, step: float, text: str) -> None:
+    varied = Axis("gains", "k_p", "1", low, low + step, step, "larger")
+    assert half_text({"half": half, "low": low, "high": low + step}, varied) == text
+
+
+def test_numbers_of_a_fine_grid_are_not_rounded_away() -> None:
+    half = half_point([[0.0, 1.0, 1.0, 0.0, 0.0, 0.0]] * 3, M_BAR.levels)
+    assert half.value == 0.1  # not 0.100000000000015
+    fine = Axis("gains", "m_bar", "kg m^2", 0.02, 0.06, 0.002, "larger")
+    grid = dataclasses.replace(found({"artde": [40.0] * 3, "tde": [30.0] * 3}), axis=fine)
+    assert outlasts(("artde", "tde"))(grid).measured == "artde beyond tde by +0.01 (+0.008..+0.012) kg m^2"
+
+
 def test_differences_are_paired() -> None:
     """Each seed survives 6 N more under the first: the seeds' own scatter of 10 N drops out of the difference."""
     edges = np.random.default_rng(1).uniform(28, 42, 30)
@@ -146,7 +186,77 @@ def test_differences_are_paired() -> None:
     same = half_difference(steps(edges.tolist()), steps(edges.tolist()), GRID)
     assert same.low < 0.0 == same.value < same.high
     both = half_difference(steps([99.0] * 4), steps([99.0] * 4), GRID)
-    assert both.value == 0.0
+    assert math.isnan(both.value)
+
+
+# ---------------------------------------------------------------- what a report says of a curve
+
+M_BAR = Axis("gains", "m_bar", "kg m^2", 0.01, 0.21, 0.04, "larger")
+
+
+def printed_by(grid: Frontier) -> str:
+    console = Console(width=200)
+    with console.capture() as printed:
+        print_frontier(grid, console)
+    return printed.get()
+
+
+def test_an_interrupted_grid_says_between_how_many_episodes_it_has() -> None:
+    grid = curves(M_BAR, {"tde": [2, 0, 0, 0, 0, 0]}, episodes=2)
+    grid.levels.loc[3:, "episodes"] = 1
+    assert "of 1 to 2 seeded episodes" in printed_by(grid)
+
+
+def test_without_a_whole_grid_there_is_no_heading_of_half_points() -> None:
+    grid = curves(M_BAR, {"tde": [3, 3]})
+    assert "Half of" not in printed_by(grid)
+    assert not any("Half points" in part for part in frontier_page.parts(grid))
+
+
+def curves(varied: Axis, survived: dict[str, list[int]], episodes: int = 3) -> Frontier:
+    """A grid in which so many of the episodes survive the levels, easiest first; the last levels may be missing."""
+    rows = [
+        dict(zip(LEVEL_COLUMNS, (value, name, episodes, count, *rate(count, episodes)[:3]), strict=True))
+        for name, counts in survived.items()
+        for value, count in zip(varied.levels, counts, strict=False)
+    ]
+    whole = {name: counts for name, counts in survived.items() if len(counts) == len(varied.levels)}
+    tables = {name: [[i < count for count in counts] for i in range(episodes)] for name, counts in whole.items()}
+    half = pd.DataFrame([(name, *half_point(table, varied.levels)) for name, table in tables.items()], columns=COLUMNS)
+    return dataclasses.replace(frontier_of(varied, list(survived), rows, 0.9, None, whole == survived), half=half)
+
+
+@pytest.mark.parametrize(
+    ("survived", "headline"),
+    [
+        (
+            {"tde": [0, 3, 3, 0, 0, 0]},
+            "No controller survives the easiest level of gains.m_bar, 0.01 kg m^2, in 90 % of the episodes.",
+        ),
+        ({"tde": [3, 3], "artde": [2]}, "No frontier of gains.m_bar is found yet."),
+        ({"tde": [3, 0], "artde": [3]}, "tde goes farthest so far in gains.m_bar: 0.01 kg m^2 (artde open)."),
+        ({"tde": [3, 0, 0, 0, 0, 0]}, "tde goes farthest in gains.m_bar: 0.01 kg m^2."),
+    ],
+)
+def test_headline_is_no_more_than_the_levels_say(survived: dict[str, list[int]], headline: str) -> None:
+    assert frontier_page.answer(curves(M_BAR, survived))[0] == headline
+
+
+@pytest.mark.parametrize(
+    ("survived", "rises"),
+    [
+        ([0, 3, 3, 0, 0, 0], "from 0.01 to 0.05"),  # of 3 episodes: no intervals are disjoint
+        ([3, 1, 2, 0, 0, 0], "from 0.05 to 0.09"),
+        ([3, 2, 3, 1, 1, 0], ""),
+        ([1, 0, 1, 0, 0, 0], ""),
+    ],
+)
+def test_a_rise_across_one_half_is_told(survived: list[int], rises: str) -> None:
+    grid = curves(M_BAR, {"tde": survived})
+    note = f"Survival rises, which half points hide: tde {rises} kg m^2." if rises else ""
+    assert rising_note(grid) == note
+    assert ([line for line in frontier_page.answer(grid)[1] if "rises" in line] == [note]) == bool(rises)
+    assert ("rises" in printed_by(grid)) == bool(rises)
 
 
 # ---------------------------------------------------------------- claims on grids
@@ -178,6 +288,14 @@ def test_who_survives_more(edges: dict[str, float], outcome: str) -> None:
     verdict = outlasts(("artde", "atde", "tde"))(found({name: [edge] * 20 for name, edge in edges.items()}))
     assert verdict.outcome == outcome
     assert "artde beyond atde by " in verdict.measured
+
+
+def test_an_unknown_gap_is_no_number_and_a_number_has_no_unit() -> None:
+    verdict = outlasts(("artde", "tde"))(found({"artde": [99.0] * 3, "tde": [99.0] * 3}))
+    assert (verdict.outcome, verdict.measured) == ("undecided", "artde beyond tde by an unknown amount")
+    share = Axis("grf_pulse", "share", "1", 20.0, 60.0, 2.0, "larger")
+    grid = dataclasses.replace(found({"artde": [40.0] * 3, "tde": [30.0] * 3}), axis=share)
+    assert outlasts(("artde", "tde"))(grid).measured == "artde beyond tde by +10 (+8..+12)"
 
 
 def test_who_survives_more_needs_all_of_them() -> None:
@@ -312,11 +430,11 @@ def test_gains_are_varied(tmp_path: Path) -> None:
 
 def test_command_with_scenarios_and_figures(tmp_path: Path) -> None:
     arguments = ["frontier", "--vary", "grf_pulse.magnitude", "--grid", "--scenario", "S1,S2", "--controllers", "tde"]
-    arguments += ["--low", "20", "--high", "60", "--tolerance", "40", "--episodes", "1", "--workers", "1"]
+    arguments += ["--low", "20", "--high", "60", "--tolerance", "40", "--episodes", "2", "--workers", "1"]
     arguments += ["--env-kwargs", json.dumps(SHORT), "--out", str(tmp_path / "run")]
     outcome = CliRunner().invoke(app, [*arguments, "--figure", str(tmp_path / "curve.svg")])
     assert outcome.exit_code == 0, outcome.output
-    for word in ("falls at (N)", "0/1", "tde: > 60", "S2"):
+    for word in ("falls at (N)", "of 2 seeded", "0/2", "tde: > 60", "S2"):
         assert word in outcome.output
     for name in ("S1", "S2"):
         drawn = (tmp_path / f"curve-{name}.svg").read_text()

@@ -23,7 +23,8 @@ def print_frontier(found: Frontier, console: Console) -> None:
         console.print(Text(f"Frontier of {axis.path}", style="bold"))
         wanted = f"{100 * found.survival:g} %"
         most = "largest" if axis.harder == "larger" else "smallest"
-        count = max(found.levels["episodes"].tolist())
+        counts = found.levels["episodes"].tolist()
+        count = " to ".join(map(str, sorted({min(counts), max(counts)})))
         note = (
             f"{most} value at which at least {wanted} of {count} seeded episodes end without a fall, on a grid of "
             f"{_value(axis.tolerance, axis.unit)} from {axis.low:g} to {_value(axis.high, axis.unit)}; the intervals "
@@ -62,6 +63,8 @@ def _print_grid(found: Frontier, console: Console) -> None:
         rows = {row["controller"]: row for row in level.to_dict(orient="records")}
         falls.add_row(f"{value:g}", *(_falls(rows.get(name)) for name in names))
     console.print(falls)
+    if found.half.empty:
+        return
     console.print(
         "Half of the episodes end without a fall at (95 % interval: bootstrap over seeds, no narrower than the grid):"
     )

@@ -6,8 +6,8 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from artde_gym.errors import OptionError, suggest_names
-from artde_gym.evaluation.cells import Cell, validate_cell
+from artde_gym.errors import DisturbanceError, OptionError, suggest_names
+from artde_gym.evaluation.cells import Cell
 from artde_gym.evaluation.environments import arguments_of
 from artde_gym.evaluation.plan import Plan
 from artde_gym.studies.frontier.axis import GAINS, Axis
@@ -35,7 +35,8 @@ class Design:
         """Make a design from a plan with one cell; without disturbances of its own, it is the robot's standard test.
 
         Raises:
-            UnknownNameError, OptionError, DisturbanceError: if the test, or an end of the axis, is not allowed.
+            UnknownNameError, OptionError, DisturbanceError, GainError: if the test, or an end of the axis, is not
+                allowed.
         """
         if not (isinstance(survival, (int, float)) and 0 < survival <= 1):
             raise OptionError("survival", survival, "above 0 up to 1")
@@ -43,6 +44,10 @@ class Design:
         arguments = dict(cell.kwargs)
         disturbances = arguments.pop("disturbances", None)
         _check_arguments(cell.env_id, plan.vectorized, axis, arguments)
+        for name, gains in plan.gains.items():
+            if axis.kind == GAINS and axis.name in gains:
+                raise OptionError(f"gain of {name!r}", axis.name, "leave it out", "is varied")
+        is_standard = disturbances is None
         if disturbances is None:
             disturbances, arguments = standard_test(cell.env_id, axis.path, arguments, scenario)
         elif scenario is not None:
@@ -51,9 +56,14 @@ class Design:
             )
         design = cls(axis, survival, disturbances, arguments)
         for end in (axis.levels[0], axis.levels[-1]):
-            placed = design.at(end, cell)
-            if axis.kind is None:  # only the environment knows the argument's range: let it check at once
-                validate_cell(plan.vectorized, placed)
+            gains = design.gains_at(end, plan)
+            try:
+                dataclasses.replace(plan, cells=(design.at(end, cell),), gains=gains).try_out()
+            except DisturbanceError as error:
+                if not is_standard:
+                    raise
+                remedy = "pass `disturbances`, or a scenario that has the whole of it"
+                raise OptionError("vary", axis.path, remedy, f"makes no standard test ({error})") from error
         return design
 
     def gains_at(self, value: float, plan: Plan) -> Mapping[str, dict[str, Any]]:

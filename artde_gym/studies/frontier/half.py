@@ -14,9 +14,8 @@ from scipy.optimize import isotonic_regression
 from artde_gym.arrays import Array
 from artde_gym.evaluation.statistics import CONFIDENCE, Estimate
 from artde_gym.studies.frontier.axis import Axis
-from artde_gym.studies.frontier.result import Frontier
+from artde_gym.studies.frontier.result import HALF, Frontier
 
-HALF = 0.5
 RESAMPLES = 2000
 COLUMNS = ["controller", "half", "low", "high", "episodes"]
 
@@ -24,7 +23,8 @@ COLUMNS = ["controller", "half", "low", "high", "episodes"]
 def half_point(survived: ArrayLike, grid: Sequence[float]) -> Estimate:
     """Estimate where survival crosses one half, with a bootstrap interval over seeds.
 
-    Survival is made to fall from level to level (isotonic regression) and is linear in between. Seeds are drawn anew
+    Survival is made to fall from level to level (isotonic regression) and is linear in between; where it rises, see
+    `artde_gym.studies.frontier.result.rising_note`. Seeds are drawn anew
     with all their levels, since these share a seed's disturbances. A sample says between which two levels it crosses,
     so that the interval is never narrower than the grid: it runs from the 2.5 % quantile of the lower ones of those
     levels to the 97.5 % quantile of the upper ones.
@@ -36,31 +36,38 @@ def half_point(survived: ArrayLike, grid: Sequence[float]) -> Estimate:
     Returns:
         The value and its interval. Infinite, in the direction that is harder, where more than half survive the hardest
         level; in the other one where not even half survive the easiest. NaN where half survive the hardest level but
-        not the easiest one: then survival rises where it should fall.
+        not the easiest one: then survival rises where it should fall. It is over the fewest episodes of a level, and
+        the interval of a single one is NaN.
     """
     table = np.asarray(survived, dtype=np.float64)
+    count = _fewest(table)
+    if count == 0:
+        return Estimate(math.nan, math.nan, math.nan, 0)
     rates = np.nanmean(table, axis=0)
     if rates[0] < HALF < rates[-1]:
-        return Estimate(math.nan, math.nan, math.nan, len(table))
+        return Estimate(math.nan, math.nan, math.nan, count)
     value = _crossing(rates, grid)[0]
+    if count == 1:
+        return Estimate(value, math.nan, math.nan, 1)
     brackets = _brackets(table, grid)
-    return Estimate(value, *_interval(brackets[:, 0], brackets[:, 1]), len(table))
+    return Estimate(value, *_interval(brackets[:, 0], brackets[:, 1]), count)
 
 
 def half_difference(first: ArrayLike, second: ArrayLike, grid: Sequence[float]) -> Estimate:
     """By how much the half point of `first` exceeds that of `second` on the same seeds; as for `half_point`.
 
     The interval runs from the smallest difference that the brackets allow to the largest. An end is infinite, or NaN,
-    where the grid does not reach far enough.
+    where the grid does not reach far enough; the value is NaN where it reaches neither half point, or one is NaN.
     """
     tables = [np.asarray(table, dtype=np.float64) for table in (first, second)]
     values = [half_point(table, grid).value for table in tables]
-    if np.isnan(values).any():
-        return Estimate(math.nan, math.nan, math.nan, len(tables[0]))
+    count = min(map(_fewest, tables))
+    if np.isnan(values).any() or count == 1:
+        return Estimate(values[0] - values[1], math.nan, math.nan, count)
     (low, high), (other_low, other_high) = (_brackets(table, grid).T for table in tables)
     with np.errstate(invalid="ignore"):
-        value = values[0] - values[1] if values[0] != values[1] else 0.0
-        return Estimate(value, *_interval(low - other_high, high - other_low), len(tables[0]))
+        value = values[0] - values[1]
+        return Estimate(value, *_interval(low - other_high, high - other_low), count)
 
 
 def survival_table(found: Frontier, name: str) -> Array | None:
@@ -89,11 +96,24 @@ def half_text(row: dict[Any, Any], varied: Axis, *, unit: bool = False) -> str:
     if math.isnan(row["half"]):
         return "none, since survival rises"
     beyond = {math.inf: f"> {varied.high:g}", -math.inf: f"< {varied.low:g}"}
-    text = beyond.get(row["half"]) or f"{row['half']:.3g}"
-    if row["low"] != row["high"]:
+    text = beyond.get(row["half"]) or f"{rounded(row['half'], varied):g}"
+    if row["low"] < row["high"]:  # not NaN, of a single episode
         low, high = (beyond.get(row[end]) or f"{row[end]:g}" for end in ("low", "high"))
         text += f" ({low}..{high})"
     return f"{text} {varied.unit}" if unit and varied.unit != "1" else text
+
+
+def rounded(value: float, varied: Axis) -> float:
+    """Round to three digits, or to a tenth of the grid's step where that is finer."""
+    if value == 0 or not math.isfinite(value):
+        return value
+    digits = math.floor(math.log10(abs(value))) - math.floor(math.log10(varied.tolerance)) + 2
+    return float(f"{value:.{max(3, digits)}g}")
+
+
+def _fewest(table: Array) -> int:
+    """Return the number of episodes at the level that has the fewest."""
+    return int(np.isfinite(table).sum(axis=0).min())
 
 
 def _brackets(table: Array, grid: Sequence[float]) -> Array:
@@ -127,6 +147,6 @@ def _crossing(rates: Array, grid: Sequence[float]) -> tuple[float, float, float]
     last, first = int(np.flatnonzero(curve >= HALF)[-1]), int(np.flatnonzero(curve <= HALF)[0])
     if last >= first:  # it stays at one half from level to level
         outer = max(first - 1, 0), min(last + 1, len(grid) - 1)
-        return (grid[first] + grid[last]) / 2, grid[outer[0]], grid[outer[1]]
+        return float(f"{(grid[first] + grid[last]) / 2:.10g}"), grid[outer[0]], grid[outer[1]]
     share = (curve[last] - HALF) / (curve[last] - curve[first])
-    return grid[last] + share * (grid[first] - grid[last]), grid[last], grid[first]
+    return float(f"{grid[last] + share * (grid[first] - grid[last]):.10g}"), grid[last], grid[first]

@@ -14,6 +14,7 @@ import pandas as pd
 from artde_gym.studies.frontier.axis import Axis
 
 RECORD = "frontier.json"
+HALF = 0.5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,7 +33,7 @@ class Frontier:
         folder: the results folder, if they are stored.
         complete: False if the search was interrupted.
         half: of a grid, one row a controller: the value at which `half` of the episodes are survived with its 95 %
-            interval `low`, `high`, over so many `episodes` a level; see `artde_gym.studies.frontier.half`.
+            interval `low`, `high`, over at least so many `episodes` a level; see `artde_gym.studies.frontier.half`.
         episodes: of a grid that has just been run, those of all levels, whose numbers are the scenarios.
     """
 
@@ -73,7 +74,7 @@ def direction_note(found: Frontier) -> str:
 
 
 def rising_note(found: Frontier) -> str:
-    """Say where survival rises from a level of a grid to the next harder one beyond chance; "" if nowhere.
+    """Say where survival rises from a level of a grid to the next harder one, across one half or beyond chance.
 
     Beyond chance means that the 95 % intervals of the two levels do not overlap. A half point, which is that of a
     monotone fit, and a frontier, which ends at the first level not survived, both hide such a rise.
@@ -82,10 +83,11 @@ def rising_note(found: Frontier) -> str:
         return ""
     unit = "" if found.axis.unit == "1" else f" {found.axis.unit}"
     levels = found.levels.set_index(["controller", "value"])
+    rate, low, high = (levels[column].to_dict() for column in ("rate", "low", "high"))
     rises = [
         f"{name} from {easier:g} to {harder:g}{unit}"
         for name in found.half["controller"]
         for easier, harder in itertools.pairwise(found.axis.levels)
-        if levels["high"][name, easier] < levels["low"][name, harder]
+        if rate[name, easier] < HALF <= rate[name, harder] or high[name, easier] < low[name, harder]
     ]
-    return f"Survival rises beyond chance, which half points hide: {', '.join(rises)}." if rises else ""
+    return f"Survival rises, which half points hide: {', '.join(rises)}." if rises else ""

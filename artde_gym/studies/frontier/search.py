@@ -2,7 +2,8 @@
 
 The standard test, the same for all controllers and the default for disturbances, is a walk of Ojas of 12 s in scenario
 S2, or a flight of the Q450 of 20 s in scenario Q1 (its payload is not dropped before the end), with the varied number
-set to its value. If a push is varied, one push for 0.2 s on the chest, or the vehicle, replaces the scenario's own. It
+set to its value. If a push's magnitude is varied, one push for 0.2 s on the chest, or the vehicle, replaces the
+scenario's own; so does a pulse of the ground force. Without a default range, the scenario's own are varied. The push
 comes from any side with equal probability, at a time drawn uniformly from one stride of steady walking (5 to 7 s) or
 half a loop at full speed (6 to 16 s), since a robot is easier to topple in some phases than in others. If a rotor's
 loss is varied, it is the front left rotor's, from such a time on.

@@ -46,6 +46,8 @@ def standard_test(
     arguments = {**usual, **(test.kwargs if scenario else {}), **arguments}
     disturbances: dict[str, Any] = copy.deepcopy(dict(test.disturbances))
     kind = path.split(".")[0]
+    if kind in disturbances and path not in standard.ranges:  # what is varied would not complete the standard's entry
+        return disturbances, arguments
     if kind in standard.repeated:
         disturbances[kind] = copy.deepcopy(standard.repeated[kind])
     duration, last = arguments.get("duration", standard.duration), standard.when[1]

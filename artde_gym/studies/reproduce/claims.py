@@ -21,7 +21,8 @@ from artde_gym.evaluation.pairing import paired_across
 from artde_gym.evaluation.result import Result
 from artde_gym.evaluation.statistics import Estimate
 from artde_gym.registry import Registry
-from artde_gym.studies.frontier.half import half_difference, survival_table
+from artde_gym.studies.frontier.axis import Axis
+from artde_gym.studies.frontier.half import half_difference, rounded, survival_table
 from artde_gym.studies.frontier.result import Frontier
 
 CLAIM_COLUMNS = ["scenario", "claim", "verdict", "measured", "thesis"]
@@ -242,7 +243,7 @@ def outlasts(names: Sequence[str]) -> Callable[[Frontier], Verdict]:
         known = [table for table in tables.values() if table is not None]
         gaps = [half_difference(first, second, levels) for first, second in itertools.pairwise(known)]
         measured = ", ".join(
-            f"{first} beyond {second} by {_gap(gap)} {found.axis.unit}"
+            f"{first} beyond {second} by {_gap(gap, found.axis)}"
             for (first, second), gap in zip(itertools.pairwise(names), gaps, strict=True)
         )
         # an end of 0 counts: half points lie inside their brackets, and brackets that share only a level differ
@@ -343,5 +344,8 @@ def _interval(estimate: Estimate) -> str:
     return f"{estimate.value:+.1f}{span}"
 
 
-def _gap(gap: Estimate) -> str:
-    return f"{gap.value:+.1f} ({gap.low:+g}..{gap.high:+g})"
+def _gap(gap: Estimate, varied: Axis) -> str:
+    if np.isnan(gap.value):
+        return "an unknown amount"
+    span = "" if np.isnan([gap.low, gap.high]).any() else f" ({gap.low:+g}..{gap.high:+g})"
+    return f"{rounded(gap.value, varied):+g}{span}{'' if varied.unit == '1' else f' {varied.unit}'}"
