@@ -129,7 +129,7 @@ def _curves(found: Multiverse) -> str:
     along, by = found.design.figure
     shown = styles(found.controllers)
     numbers = along.numbers(_values(found, along))
-    edges = np.unique(np.quantile(numbers, np.linspace(0.0, 1.0, BINS + 1)))
+    bins = _bins(along, numbers)
     key = ", ".join(f"{place}: {text}" for place, text in enumerate(along.categories))
     x = Axis.of(f"{along.label}, {key}" if key else along.label, numbers, log=along.kind == "log_uniform")
     charts = {}
@@ -138,10 +138,19 @@ def _curves(found: Multiverse) -> str:
             f"Worlds without a fall against {along.name}, {head}", x, Axis("no fall (%)", 0.0, 104.0), 340, 230
         )
         for i, name in enumerate(found.controllers):
-            _curve(chart, found, name, chosen, numbers, edges, shown[name], i)
+            _curve(chart, found, name, chosen, numbers, bins, shown[name], i)
         charts[head] = chart.svg()
-    caption = f"Survival against {along.name}, in bins of equally many worlds; bars are 95 % intervals (Wilson)."
+    points = "at each choice" if along.kind == "choice" else "in bins of equally many worlds"
+    caption = f"Survival against {along.name}, {points}; bars are 95 % intervals (Wilson)."
     return figure(caption, charts, shown)
+
+
+def _bins(along: Factor, numbers: np.ndarray) -> np.ndarray:
+    """Return the number of each world's bin: one a choice, else of equally many worlds."""
+    if along.kind == "choice":
+        return np.unique(numbers, return_inverse=True)[1]
+    inner = np.unique(np.quantile(numbers, np.linspace(0.0, 1.0, BINS + 1)))[1:-1]
+    return np.searchsorted(inner, numbers, side="right")
 
 
 def _curve(
@@ -150,18 +159,17 @@ def _curve(
     name: str,
     chosen: set[int],
     numbers: np.ndarray,
-    edges: np.ndarray,
+    bins: np.ndarray,
     look: Style,
     place: int,
 ) -> None:
     rows = found.episodes[found.episodes["controller"] == name]
     fell = {int(world): bool(fell) for world, fell in zip(rows["world"], rows["fell"], strict=True)}
     worlds = [world for world in fell if world in chosen]
-    bins = np.clip(np.searchsorted(edges, numbers[worlds], side="right") - 1, 0, max(len(edges) - 2, 0))
     shift = (place / max(len(found.controllers) - 1, 1) - 0.5) * 0.03 * (chart.x.high - chart.x.low)
     points = []
-    for one in range(len(edges) - 1):
-        inside = [world for world, number in zip(worlds, bins.tolist(), strict=True) if number == one]
+    for one in range(bins.max() + 1):
+        inside = [world for world in worlds if bins[world] == one]
         if inside:
             share = statistics.rate(sum(not fell[world] for world in inside), len(inside))
             points.append((float(np.mean(numbers[inside])) + shift, share))

@@ -5,15 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
 from artde_gym.cli import app
 from artde_gym.errors import OptionError, StoreError
-from artde_gym.report import write_report
+from artde_gym.report import multiverse_page, write_report
 from artde_gym.studies import multiverse, read_multiverse
 from artde_gym.studies.multiverse.design import design
 from artde_gym.studies.multiverse.factor import Factor
+from artde_gym.studies.multiverse.result import Multiverse
 
 pytest.importorskip("pyarrow", reason="pyarrow is not installed (extra sweep)")
 
@@ -113,3 +115,29 @@ def test_a_folder_without_an_episode_has_nothing_to_report(tmp_path: Path) -> No
         file.unlink()
     with pytest.raises(StoreError, match="no finished episode"):
         write_report(tmp_path)
+
+
+def by_hand(made: dict[str, Any], falls: list[bool]) -> Multiverse:
+    """Results in which both controllers fall in the same worlds."""
+    same = {"env": made["env"], "scenario": "custom", "duration_s": 1.0, "rmse_m": 1.0}
+    rows = [
+        {"world": world, "controller": name, "fell": fell, **same}
+        for name in made["controllers"]
+        for world, fell in enumerate(falls)
+    ]
+    return Multiverse(pd.DataFrame(rows), design({**made, "worlds": len(falls)}), Path(), True, {})
+
+
+def test_survival_is_drawn_at_each_choice() -> None:
+    made = flight("disturbances.payload.mass", [0.1, 0.3])
+    heavy = [world.factors["x"] == 0.3 for world in design({**made, "worlds": 13}).worlds]
+    survival = dict(multiverse_page.parts(by_hand(made, heavy)))["Survival"][1]
+    assert "tde: 100 (" in survival
+    assert "tde: 0 (" in survival
+    assert f"% of {heavy.count(True)}<" in survival
+    assert f"% of {heavy.count(False)}<" in survival
+
+
+def test_one_world_has_a_point_of_survival() -> None:
+    factors = {"x": {"path": "disturbances.payload.mass", "uniform": [0.1, 0.3], "source": "a guess"}}
+    assert "% of 1<" in dict(multiverse_page.parts(by_hand({**FLIGHT, "factors": factors}, [False])))["Survival"][1]
