@@ -16,7 +16,7 @@ from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.html import Cell, details, figure, paragraph, table
 from artde_gym.studies.multiverse.claims import OUTCOMES
 from artde_gym.studies.multiverse.console import all_deciding, deciding_text, p_text, share_text
-from artde_gym.studies.multiverse.deciding import Deciding, Node, rank_correlations
+from artde_gym.studies.multiverse.deciding import FOLDS, Deciding, Node, rank_correlations
 from artde_gym.studies.multiverse.factor import Factor
 from artde_gym.studies.multiverse.result import FATES, Multiverse
 from artde_gym.studies.multiverse.verdict import Verdict
@@ -236,7 +236,9 @@ def _trees(found: Multiverse) -> list[str]:
                 drawn.append(details(what, part) if drawn else part)
     except MissingDependencyError as error:
         return [paragraph(f"Which factors decide is not told: {error}", "soft")]
-    return drawn or [paragraph("Almost all worlds agree: there is nothing to decide.", "soft")]
+    return drawn or [
+        paragraph(f"Which factors decide is not told: it takes two outcomes of {FOLDS} worlds each.", "soft")
+    ]
 
 
 def _tree(decided: Deciding, factors: Sequence[Factor], shown: Mapping[str, Style]) -> str:

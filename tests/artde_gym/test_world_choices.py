@@ -138,6 +138,13 @@ def test_survival_is_drawn_at_each_choice() -> None:
     assert f"% of {heavy.count(False)}<" in survival
 
 
+def test_a_report_says_how_many_worlds_a_tree_takes() -> None:
+    pytest.importorskip("sklearn", reason="scikit-learn is not installed (extra multiverse)")
+    made = flight("disturbances.payload.mass", [0.1, 0.3])
+    factors = dict(multiverse_page.parts(by_hand(made, [True] * 3 + [False] * 5)))["Factors"]
+    assert "it takes two outcomes of 5 worlds each" in factors[-1]
+
+
 def test_one_world_has_a_point_of_survival() -> None:
     factors = {"x": {"path": "disturbances.payload.mass", "uniform": [0.1, 0.3], "source": "a guess"}}
     assert "% of 1<" in dict(multiverse_page.parts(by_hand({**FLIGHT, "factors": factors}, [False])))["Survival"][1]
