@@ -5,12 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
+import artde_gym
+from artde_gym import registration
 from artde_gym.cli import app
-from artde_gym.errors import OptionError, StoreError
+from artde_gym.errors import ActionError, OptionError, StoreError
 from artde_gym.report import multiverse_page, write_report
 from artde_gym.studies import multiverse, read_multiverse
 from artde_gym.studies.multiverse.design import design
@@ -148,3 +151,26 @@ def test_a_report_says_how_many_worlds_a_tree_takes() -> None:
 def test_one_world_has_a_point_of_survival() -> None:
     factors = {"x": {"path": "disturbances.payload.mass", "uniform": [0.1, 0.3], "source": "a guess"}}
     assert "% of 1<" in dict(multiverse_page.parts(by_hand({**FLIGHT, "factors": factors}, [False])))["Survival"][1]
+
+
+class Broken:
+    """A controller whose actions are wrong where its gain is below zero."""
+
+    def __init__(self, env: Any, gain: float = 1.0) -> None:
+        self.action = np.full(4, 0.0 if gain > 0 else np.nan)
+
+    def predict(self, observation: Any, *_: Any, **__: Any) -> tuple[Any, None]:
+        return np.broadcast_to(self.action, (*observation.shape[:-1], 4)), None
+
+
+@pytest.mark.parametrize("vectorized", [False, True])
+def test_a_wrong_action_names_its_controller_and_world(
+    vectorized: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(registration, "_controllers", {})
+    artde_gym.register_controller("broken", f"{__name__}:Broken")
+    names = ["tde", "broken"]
+    made = flight("gains.broken.gain", [1.0, -1.0], controllers=names, vectorized=vectorized, claims=[{"order": names}])
+    bad = next(world.number for world in design(made).worlds if world.factors["x"] < 0)
+    with pytest.raises(ActionError, match=rf"^action[^(]* \(broken in custom, world {bad}\) is \[nan"):
+        multiverse(made, tmp_path)

@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
-from artde_gym.errors import ArtdeGymError
+from artde_gym.errors import ActionError, ArtdeGymError
 from artde_gym.evaluation.cells import shared_kwargs, validate_cell, vector_of
 from artde_gym.evaluation.gains import policy_for
 from artde_gym.evaluation.registered import METRICS
@@ -68,8 +68,10 @@ def run(job: Job, on_time: Callable[[float], None]) -> list[Episode]:
     """Run a job; what goes wrong is told with the worlds."""
     try:
         return run_task(job.task, on_time)
+    except ActionError as error:  # it names the controller, and the episode, which here is the world
+        raise ActionError(error.field.replace(", episode ", ", world "), *error.args[1:]) from error
     except ArtdeGymError as error:
-        worlds = f"{job.task.controller} in world {', '.join(map(str, job.task.episodes))}"
+        worlds = f"{job.task.controller} in world {', '.join(map(str, dict.fromkeys(job.task.episodes)))}"
         raise error.within(worlds) from error
 
 
