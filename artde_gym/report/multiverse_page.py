@@ -43,11 +43,13 @@ def answer(found: Multiverse) -> tuple[str, list[str]]:
 
 def parts(found: Multiverse) -> Iterator[tuple[str, list[str]]]:
     """Yield the sections: a title, and what stands below it."""
-    yield "Claims", [_verdict_bars(found.verdicts), _claims(found)]
+    if found.verdicts:
+        yield "Claims", [_verdict_bars(found.verdicts), _claims(found)]
     yield "Survival", [_survival(found), _curves(found)]
     yield "Factors", [_effects(found), *_trees(found)]
     yield "Errors where both survive", _ratios(found)
-    yield "Worlds to run again", [_ends(found, verdict) for verdict in found.verdicts]
+    if found.verdicts:
+        yield "Worlds to run again", [_ends(found, verdict) for verdict in found.verdicts]
     yield "Design", [_design(found)]
 
 

@@ -8,16 +8,19 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from rich.console import Console
 from typer.testing import CliRunner
 
 import artde_gym
 from artde_gym import registration
 from artde_gym.cli import app
-from artde_gym.errors import ActionError, OptionError, StoreError
+from artde_gym.errors import ActionError, DisturbanceError, OptionError, StoreError
 from artde_gym.report import multiverse_page, write_report
 from artde_gym.studies import multiverse, read_multiverse
+from artde_gym.studies.multiverse.console import print_multiverse
 from artde_gym.studies.multiverse.design import design
 from artde_gym.studies.multiverse.factor import Factor
+from artde_gym.studies.multiverse.job import check_points
 from artde_gym.studies.multiverse.result import Multiverse
 
 pytest.importorskip("pyarrow", reason="pyarrow is not installed (extra sweep)")
@@ -174,3 +177,28 @@ def test_a_wrong_action_names_its_controller_and_world(
     bad = next(world.number for world in design(made).worlds if world.factors["x"] < 0)
     with pytest.raises(ActionError, match=rf"^action[^(]* \(broken in custom, world {bad}\) is \[nan"):
         multiverse(made, tmp_path)
+
+
+@pytest.mark.parametrize("vectorized", [False, True])
+def test_a_world_that_is_refused_is_named(vectorized: bool) -> None:
+    made = design(flight("disturbances.payload.mass", [0.1, 9.0], vectorized=vectorized))
+    points = [(number, point) for (number, _), point in made.points().items()]
+    bad = next(world.number for world in made.worlds if world.factors["x"] == 9.0)
+    with pytest.raises(DisturbanceError, match=rf"^payload.mass \(world {bad}\) is 9"):
+        check_points(points, vectorized, lambda *_: None)
+
+
+def test_the_ends_of_a_range_are_checked_whatever_worlds_are_drawn(tmp_path: Path) -> None:
+    factors = {"load": {"path": "disturbances.payload.mass", "quantiles": [0.1, 0.5, 9.0], "source": "a guess"}}
+    made = {**FLIGHT, "factors": factors, "worlds": 1}
+    assert all(world.factors["load"] < 5.0 for world in design(made).worlds)
+    with pytest.raises(DisturbanceError, match=r"^payload.mass \(world 0 with factor 'load' at 9\.0\) is 9"):
+        multiverse(made, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_without_claims_there_is_no_table_of_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = multiverse(flight("disturbances.payload.mass", [0.1], claims=[]), tmp_path)
+    print_multiverse(found, Console(width=100))
+    assert "reverses" not in capsys.readouterr().out
+    assert next(name for name, _ in multiverse_page.parts(found)) == "Survival"
