@@ -16,7 +16,7 @@ from artde_gym.report.chart import Axis, Chart
 from artde_gym.report.html import Cell, details, figure, paragraph, table
 from artde_gym.studies.multiverse.claims import OUTCOMES
 from artde_gym.studies.multiverse.console import all_deciding, deciding_text, p_text, share_text
-from artde_gym.studies.multiverse.deciding import Deciding, Node, rank_correlations
+from artde_gym.studies.multiverse.deciding import FOLDS, Deciding, Node, rank_correlations
 from artde_gym.studies.multiverse.factor import Factor
 from artde_gym.studies.multiverse.result import FATES, Multiverse
 from artde_gym.studies.multiverse.verdict import Verdict
@@ -43,11 +43,13 @@ def answer(found: Multiverse) -> tuple[str, list[str]]:
 
 def parts(found: Multiverse) -> Iterator[tuple[str, list[str]]]:
     """Yield the sections: a title, and what stands below it."""
-    yield "Claims", [_verdict_bars(found.verdicts), _claims(found)]
+    if found.verdicts:
+        yield "Claims", [_verdict_bars(found.verdicts), _claims(found)]
     yield "Survival", [_survival(found), _curves(found)]
     yield "Factors", [_effects(found), *_trees(found)]
     yield "Errors where both survive", _ratios(found)
-    yield "Worlds to run again", [_ends(found, verdict) for verdict in found.verdicts]
+    if found.verdicts:
+        yield "Worlds to run again", [_ends(found, verdict) for verdict in found.verdicts]
     yield "Design", [_design(found)]
 
 
@@ -129,7 +131,7 @@ def _curves(found: Multiverse) -> str:
     along, by = found.design.figure
     shown = styles(found.controllers)
     numbers = along.numbers(_values(found, along))
-    edges = np.unique(np.quantile(numbers, np.linspace(0.0, 1.0, BINS + 1)))
+    bins = _bins(along, numbers)
     key = ", ".join(f"{place}: {text}" for place, text in enumerate(along.categories))
     x = Axis.of(f"{along.label}, {key}" if key else along.label, numbers, log=along.kind == "log_uniform")
     charts = {}
@@ -138,10 +140,19 @@ def _curves(found: Multiverse) -> str:
             f"Worlds without a fall against {along.name}, {head}", x, Axis("no fall (%)", 0.0, 104.0), 340, 230
         )
         for i, name in enumerate(found.controllers):
-            _curve(chart, found, name, chosen, numbers, edges, shown[name], i)
+            _curve(chart, found, name, chosen, numbers, bins, shown[name], i)
         charts[head] = chart.svg()
-    caption = f"Survival against {along.name}, in bins of equally many worlds; bars are 95 % intervals (Wilson)."
+    points = "at each choice" if along.kind == "choice" else "in bins of equally many worlds"
+    caption = f"Survival against {along.name}, {points}; bars are 95 % intervals (Wilson)."
     return figure(caption, charts, shown)
+
+
+def _bins(along: Factor, numbers: np.ndarray) -> np.ndarray:
+    """Return the number of each world's bin: one a choice, else of equally many worlds."""
+    if along.kind == "choice":
+        return np.unique(numbers, return_inverse=True)[1]
+    inner = np.unique(np.quantile(numbers, np.linspace(0.0, 1.0, BINS + 1)))[1:-1]
+    return np.searchsorted(inner, numbers, side="right")
 
 
 def _curve(
@@ -150,18 +161,17 @@ def _curve(
     name: str,
     chosen: set[int],
     numbers: np.ndarray,
-    edges: np.ndarray,
+    bins: np.ndarray,
     look: Style,
     place: int,
 ) -> None:
     rows = found.episodes[found.episodes["controller"] == name]
     fell = {int(world): bool(fell) for world, fell in zip(rows["world"], rows["fell"], strict=True)}
     worlds = [world for world in fell if world in chosen]
-    bins = np.clip(np.searchsorted(edges, numbers[worlds], side="right") - 1, 0, max(len(edges) - 2, 0))
     shift = (place / max(len(found.controllers) - 1, 1) - 0.5) * 0.03 * (chart.x.high - chart.x.low)
     points = []
-    for one in range(len(edges) - 1):
-        inside = [world for world, number in zip(worlds, bins.tolist(), strict=True) if number == one]
+    for one in range(bins.max() + 1):
+        inside = [world for world in worlds if bins[world] == one]
         if inside:
             share = statistics.rate(sum(not fell[world] for world in inside), len(inside))
             points.append((float(np.mean(numbers[inside])) + shift, share))
@@ -228,7 +238,9 @@ def _trees(found: Multiverse) -> list[str]:
                 drawn.append(details(what, part) if drawn else part)
     except MissingDependencyError as error:
         return [paragraph(f"Which factors decide is not told: {error}", "soft")]
-    return drawn or [paragraph("Almost all worlds agree: there is nothing to decide.", "soft")]
+    return drawn or [
+        paragraph(f"Which factors decide is not told: it takes two outcomes of {FOLDS} worlds each.", "soft")
+    ]
 
 
 def _tree(decided: Deciding, factors: Sequence[Factor], shown: Mapping[str, Style]) -> str:

@@ -111,6 +111,9 @@ def quadrotor(tmp_path_factory) -> Any:
         ({"worlds": 0}, "worlds is 0"),
         ({"vectorized": "batches"}, "vectorized is 'batches'"),
         ({"env": None}, "neither env nor scenario"),
+        ({"figure": ["x", "x"]}, "factor of the figure 'x' is given twice"),
+        ({"matched": "tde"}, "matched 'tde' has no adaptive gain"),
+        ({"matched": "tde", "vectorized": True}, "matched 'tde' has no adaptive gain"),
         ({"figure": ["y"]}, "one or two of the factors: x"),
         ({"figure": [["x"]]}, "one or two of the factors: x"),
         ({"set": {"disturbances.payload.mass": 1.0}}, "needs a scenario"),
@@ -132,7 +135,9 @@ def test_a_wrong_design_is_refused_in_one_line_before_anything_is_written(tmp_pa
 def test_what_an_environment_refuses_shows_before_the_first_episode(tmp_path):
     factors = {"payload": {"path": "disturbances.payload.mass", "uniform": [4.0, 50.0], "source": "too much"}}
     for vectorized in (False, True):
-        with pytest.raises(ArtdeGymError, match=r"payload.mass is .*; allowed: .*5"):
+        with pytest.raises(
+            ArtdeGymError, match=r"payload.mass \(world 0 with factor 'payload' at 50.0\) is .*; allowed: .*5"
+        ):
             multiverse(
                 {**SMALL, "disturbances": {}, "factors": factors, "vectorized": vectorized}, tmp_path / str(vectorized)
             )

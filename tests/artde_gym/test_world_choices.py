@@ -5,15 +5,23 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pandas as pd
 import pytest
+from rich.console import Console
 from typer.testing import CliRunner
 
+import artde_gym
+from artde_gym import registration
 from artde_gym.cli import app
-from artde_gym.errors import OptionError, StoreError
-from artde_gym.report import write_report
+from artde_gym.errors import ActionError, DisturbanceError, OptionError, StoreError
+from artde_gym.report import multiverse_page, write_report
 from artde_gym.studies import multiverse, read_multiverse
+from artde_gym.studies.multiverse.console import print_multiverse
 from artde_gym.studies.multiverse.design import design
 from artde_gym.studies.multiverse.factor import Factor
+from artde_gym.studies.multiverse.job import check_points
+from artde_gym.studies.multiverse.result import Multiverse
 
 pytest.importorskip("pyarrow", reason="pyarrow is not installed (extra sweep)")
 
@@ -113,3 +121,84 @@ def test_a_folder_without_an_episode_has_nothing_to_report(tmp_path: Path) -> No
         file.unlink()
     with pytest.raises(StoreError, match="no finished episode"):
         write_report(tmp_path)
+
+
+def by_hand(made: dict[str, Any], falls: list[bool]) -> Multiverse:
+    """Results in which both controllers fall in the same worlds."""
+    same = {"env": made["env"], "scenario": "custom", "duration_s": 1.0, "rmse_m": 1.0}
+    rows = [
+        {"world": world, "controller": name, "fell": fell, **same}
+        for name in made["controllers"]
+        for world, fell in enumerate(falls)
+    ]
+    return Multiverse(pd.DataFrame(rows), design({**made, "worlds": len(falls)}), Path(), True, {})
+
+
+def test_survival_is_drawn_at_each_choice() -> None:
+    made = flight("disturbances.payload.mass", [0.1, 0.3])
+    heavy = [world.factors["x"] == 0.3 for world in design({**made, "worlds": 13}).worlds]
+    survival = dict(multiverse_page.parts(by_hand(made, heavy)))["Survival"][1]
+    assert "tde: 100 (" in survival
+    assert "tde: 0 (" in survival
+    assert f"% of {heavy.count(True)}<" in survival
+    assert f"% of {heavy.count(False)}<" in survival
+
+
+def test_a_report_says_how_many_worlds_a_tree_takes() -> None:
+    pytest.importorskip("sklearn", reason="scikit-learn is not installed (extra multiverse)")
+    made = flight("disturbances.payload.mass", [0.1, 0.3])
+    factors = dict(multiverse_page.parts(by_hand(made, [True] * 3 + [False] * 5)))["Factors"]
+    assert "it takes two outcomes of 5 worlds each" in factors[-1]
+
+
+def test_one_world_has_a_point_of_survival() -> None:
+    factors = {"x": {"path": "disturbances.payload.mass", "uniform": [0.1, 0.3], "source": "a guess"}}
+    assert "% of 1<" in dict(multiverse_page.parts(by_hand({**FLIGHT, "factors": factors}, [False])))["Survival"][1]
+
+
+class Broken:
+    """A controller whose actions are wrong where its gain is below zero."""
+
+    def __init__(self, env: Any, gain: float = 1.0) -> None:
+        self.action = np.full(4, 0.0 if gain > 0 else np.nan)
+
+    def predict(self, observation: Any, *_: Any, **__: Any) -> tuple[Any, None]:
+        return np.broadcast_to(self.action, (*observation.shape[:-1], 4)), None
+
+
+@pytest.mark.parametrize("vectorized", [False, True])
+def test_a_wrong_action_names_its_controller_and_world(
+    vectorized: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(registration, "_controllers", {})
+    artde_gym.register_controller("broken", f"{__name__}:Broken")
+    names = ["tde", "broken"]
+    made = flight("gains.broken.gain", [1.0, -1.0], controllers=names, vectorized=vectorized, claims=[{"order": names}])
+    bad = next(world.number for world in design(made).worlds if world.factors["x"] < 0)
+    with pytest.raises(ActionError, match=rf"^action[^(]* \(broken in custom, world {bad}\) is \[nan"):
+        multiverse(made, tmp_path)
+
+
+@pytest.mark.parametrize("vectorized", [False, True])
+def test_a_world_that_is_refused_is_named(vectorized: bool) -> None:
+    made = design(flight("disturbances.payload.mass", [0.1, 9.0], vectorized=vectorized))
+    points = [(number, point) for (number, _), point in made.points().items()]
+    bad = next(world.number for world in made.worlds if world.factors["x"] == 9.0)
+    with pytest.raises(DisturbanceError, match=rf"^payload.mass \(world {bad}\) is 9"):
+        check_points(points, vectorized, lambda *_: None)
+
+
+def test_the_ends_of_a_range_are_checked_whatever_worlds_are_drawn(tmp_path: Path) -> None:
+    factors = {"load": {"path": "disturbances.payload.mass", "quantiles": [0.1, 0.5, 9.0], "source": "a guess"}}
+    made = {**FLIGHT, "factors": factors, "worlds": 1}
+    assert all(world.factors["load"] < 5.0 for world in design(made).worlds)
+    with pytest.raises(DisturbanceError, match=r"^payload.mass \(world 0 with factor 'load' at 9\.0\) is 9"):
+        multiverse(made, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_without_claims_there_is_no_table_of_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = multiverse(flight("disturbances.payload.mass", [0.1], claims=[]), tmp_path)
+    print_multiverse(found, Console(width=100))
+    assert "reverses" not in capsys.readouterr().out
+    assert next(name for name, _ in multiverse_page.parts(found)) == "Survival"

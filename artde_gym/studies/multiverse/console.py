@@ -29,7 +29,8 @@ def print_multiverse(found: Multiverse, console: Console) -> None:
         console.print("No episode was finished.")
         return
     console.print(_survival(found))
-    console.print(_claims(found))
+    if found.verdicts:
+        console.print(_claims(found))
     for verdict in found.verdicts:
         if not verdict.decided:
             console.print(Text(f"No world says anything of {verdict.claim.text!r}."))

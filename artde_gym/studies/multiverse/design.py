@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -109,6 +109,15 @@ class Design:
             UnknownNameError, OptionError: for a path or value that makes no cell.
         """
         return {(world.number, name): self._point(world, name) for world in self.worlds for name in self.controllers}
+
+    def end_points(self) -> Iterator[tuple[str, SweepCell]]:
+        """Yield the first world with each factor at each end of its range, as each controller runs it, and its name."""
+        first = self.worlds[0]
+        for factor in self.factors:
+            for value in factor.ends:
+                world = dataclasses.replace(first, factors={**first.factors, factor.name: value})
+                for name in self.controllers:
+                    yield f"world 0 with factor {factor.name!r} at {value!r}", self._point(world, name)
 
     def matched_point(self, number: int, gains: Mapping[str, float]) -> SweepCell:
         """Return the second pass in one world."""
@@ -231,4 +240,6 @@ def _figure(given: Any, factors: tuple[Factor, ...]) -> tuple[Factor, Factor | N
     good = isinstance(names, list) and all(isinstance(name, str) and name in known for name in names)
     if not (good and 1 <= len(names) <= 2):
         raise OptionError("figure", given, f"one or two of the factors: {', '.join(known)}")
+    if again := canonical.twice(names):
+        raise OptionError("factor of the figure", again, "give each one once", "is given twice")
     return known[names[0]], known[names[1]] if len(names) > 1 else None

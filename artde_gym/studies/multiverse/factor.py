@@ -75,6 +75,11 @@ class Factor:
         """The name with its unit."""
         return f"{self.name} ({self.unit})" if self.unit else self.name
 
+    @property
+    def ends(self) -> tuple[Any, ...]:
+        """The lowest and the highest value, or all choices."""
+        return self.arguments if self.kind == "choice" else (self.arguments[0], self.arguments[-1])
+
     def value(self, share: float) -> Any:
         """Return the value below which lies this share of the worlds, from 0 to 1."""
         if self.kind == "choice":

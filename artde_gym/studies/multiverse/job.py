@@ -6,13 +6,15 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
-from artde_gym.errors import ArtdeGymError
+from artde_gym.errors import ActionError, ArtdeGymError, OptionError
 from artde_gym.evaluation.cells import shared_kwargs, validate_cell, vector_of
+from artde_gym.evaluation.environments import metrics_spec_of
 from artde_gym.evaluation.gains import policy_for
 from artde_gym.evaluation.registered import METRICS
-from artde_gym.evaluation.rollout import Episode
+from artde_gym.evaluation.rollout import Episode, Policy
 from artde_gym.evaluation.seeds import episode_seed
 from artde_gym.evaluation.tasks import Case, Task, run_task
+from artde_gym.studies.multiverse.design import MATCHED
 from artde_gym.studies.sweep.design import SweepCell
 
 MOST = 200
@@ -45,31 +47,62 @@ def check_points(points: Sequence[Numbered], vectorized: bool, on_checked: Calla
     """Build everything once, so that a bad world shows before the first episode.
 
     Raises:
-        OptionError, DisturbanceError, GainError: for what an environment or a controller refuses.
+        OptionError, DisturbanceError, GainError: for what an environment or a controller refuses, with the world.
     """
     env: Any = None
     last, count = "", 0
     for job in jobs_of(points, vectorized):
         place = json.dumps([cell.kwargs for cell in job.task.cells])
-        if place != last:
-            last = place
-            if vectorized:
-                env, options = vector_of(job.task.cells)
-                env.reset(seed=0, options=options)
-            else:
-                env = validate_cell(vectorized, job.task.cell)
-        for point in job.points:
-            policy_for(point.spec, env, point.gains)
+        try:
+            if place != last:
+                last = place
+                if vectorized:
+                    env, options = vector_of(job.task.cells)
+                    env.reset(seed=0, options=options)
+                else:
+                    env = validate_cell(vectorized, job.task.cell)
+            for point in job.points:
+                policy_for(point.spec, env, point.gains)
+        except ArtdeGymError:
+            for number, point in zip(job.task.episodes, job.points, strict=True):
+                check_point(f"world {number}", point, vectorized)
+            raise
         count += len(job.points)
         on_checked(job, count)
+
+
+def check_point(place: str, point: SweepCell, vectorized: bool) -> tuple[Any, Policy]:
+    """Build one point: its environment and its controller; raises the errors of `check_points`, with the place."""
+    try:
+        env = validate_cell(vectorized, point.cell)
+        return env, policy_for(point.spec, env, point.gains)
+    except ArtdeGymError as error:
+        raise error.within(place) from error
+
+
+def check_adaptive(point: SweepCell, vectorized: bool) -> None:
+    """Check that a controller has an adaptive gain, whose mean a second pass may take.
+
+    Raises:
+        OptionError: if it has none.
+    """
+    env, policy = check_point(MATCHED, point, vectorized)
+    observation, _ = env.reset(seed=0)
+    _, state = policy.predict(observation)
+    diagnose = getattr(policy, "diagnostics", None)
+    known = {} if diagnose is None else diagnose(state)
+    if not any(name in known for name in metrics_spec_of(point.cell.env_id).diagnostic_means.values()):
+        raise OptionError("matched", point.controller, "choose an adaptive law", "has no adaptive gain")
 
 
 def run(job: Job, on_time: Callable[[float], None]) -> list[Episode]:
     """Run a job; what goes wrong is told with the worlds."""
     try:
         return run_task(job.task, on_time)
+    except ActionError as error:  # it names the controller, and the episode, which here is the world
+        raise ActionError(error.field.replace(", episode ", ", world "), *error.args[1:]) from error
     except ArtdeGymError as error:
-        worlds = f"{job.task.controller} in world {', '.join(map(str, job.task.episodes))}"
+        worlds = f"{job.task.controller} in world {', '.join(map(str, dict.fromkeys(job.task.episodes)))}"
         raise error.within(worlds) from error
 
 

@@ -75,7 +75,7 @@ class Multiverse:
         return np.stack(columns, axis=1)
 
     def deciding(self, verdict: Verdict) -> Deciding | None:
-        """Return which factors decide about a claim; None where almost all worlds agree.
+        """Return which factors decide about a claim; None without two outcomes of `FOLDS` worlds each.
 
         Raises:
             MissingDependencyError: without scikit-learn.
