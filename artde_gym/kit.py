@@ -72,8 +72,8 @@ class FrontierTest:
         scenario: name of the scenario that supplies the other disturbances.
         duration: duration of an episode (s).
         when: earliest and latest time of a varied push (s).
-        repeated: varied entries by kind; they replace the scenario's of that kind where the path has a default range, or
-            the scenario has none.
+        repeated: varied entries by kind; they replace the scenario's of that kind where the path has a default range
+            or the scenario has none.
         time_step: physics time step (s); control periods are whole multiples of it.
         ranges: path -> range; for any other path the user must give low, high and tolerance.
     """

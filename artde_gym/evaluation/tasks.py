@@ -43,7 +43,8 @@ class Task(NamedTuple):
     """Episodes that run at once: one, or some of controllers that share a vector environment.
 
     `cases` are those of the episodes; their cells differ by name and disturbances alone. The first `record_episodes` of
-    each case leave traces. `metrics` are the registered ones that the process must know.
+    each case leave traces. `metrics` are the registered ones that the process must know. `numbered` says in errors what
+    the numbers in `episodes` count.
     """
 
     vectorized: bool
@@ -53,6 +54,7 @@ class Task(NamedTuple):
     record_hz: float
     record_episodes: int
     metrics: tuple[str, ...] = ()
+    numbered: str = "episode"
 
     @property
     def cell(self) -> Cell:
@@ -72,7 +74,7 @@ class Task(NamedTuple):
     def label(self, number: int) -> str:
         """Name the task's episode at index `number` in errors."""
         case = self.cases[number]
-        return f"{case.controller} in {case.cell.name}, episode {self.episodes[number]}"
+        return f"{case.controller} in {case.cell.name}, {self.numbered} {self.episodes[number]}"
 
 
 class Update(NamedTuple):

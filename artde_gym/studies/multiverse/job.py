@@ -99,8 +99,8 @@ def run(job: Job, on_time: Callable[[float], None]) -> list[Episode]:
     """Run a job; what goes wrong is told with the worlds."""
     try:
         return run_task(job.task, on_time)
-    except ActionError as error:  # it names the controller, and the episode, which here is the world
-        raise ActionError(error.field.replace(", episode ", ", world "), *error.args[1:]) from error
+    except ActionError:  # it names controller and world
+        raise
     except ArtdeGymError as error:
         worlds = f"{job.task.controller} in world {', '.join(map(str, dict.fromkeys(job.task.episodes)))}"
         raise error.within(worlds) from error
@@ -110,4 +110,4 @@ def _job(group: Sequence[Numbered], vectorized: bool) -> Job:
     numbers, points = zip(*group, strict=True)
     cases = tuple(Case(point.cell, point.controller, point.spec, point.gains, point.seed) for point in points)
     seeds = [episode_seed(point.seed, 0) for point in points]
-    return Job(Task(vectorized, cases, list(numbers), seeds, 100.0, 0, tuple(METRICS)), tuple(points))
+    return Job(Task(vectorized, cases, list(numbers), seeds, 100.0, 0, tuple(METRICS), "world"), tuple(points))
