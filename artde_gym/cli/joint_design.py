@@ -129,11 +129,14 @@ def draw(one: Design) -> str:
     y = Axis.of(f"m_bar ({unit})", one.limit, one.m_bar, zero=True)
     chart = Chart(f"Largest valid m_bar of the {one.loop.name} along the reference", x, y, 480, 280)
     chart.line([0.0, 1.0] if still else time, np.repeat(one.limit, 2) if still else one.limit, STYLES["tde"])
-    chosen_ones = sorted(set(one.m_bar.tolist()))
-    edge = "valid below" if len(chosen_ones) == 1 else "one for all joints: valid below"
-    chart.level(one.largest, f"{edge} {one.largest:.4g}", STYLES["tde"])
-    for chosen in chosen_ones:
-        chart.level(chosen, f"chosen {chosen:.4g}", STYLES["artde"])
+    chosen = sorted(set(one.m_bar.tolist()))
+    single = len(chosen) == 1
+    chart.level(one.largest, f"valid below {one.largest:.4g}" if single else "", STYLES["tde"])
+    for value in chosen:
+        chart.level(value, f"chosen {value:.4g}" if single else "", STYLES["artde"])
+    if not single:  # labels of many lines would hide each other
+        limit = f"limit of one for all joints, {one.largest:.4g}"
+        chart.legend({limit: STYLES["tde"], f"chosen, {chosen[0]:.4g} to {chosen[-1]:.4g}": STYLES["artde"]})
     return chart.file()
 
 

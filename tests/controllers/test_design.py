@@ -117,6 +117,14 @@ def test_what_is_wrong_is_named(arguments: dict[str, Any], words: str) -> None:
         design(**arguments)
 
 
+def test_the_figure_of_an_m_bar_a_joint_names_the_limit_of_a_common_one(tmp_path: Path) -> None:
+    run = CliRunner().invoke(app, ["design", "--robot", "arm", "--figure", str(tmp_path / "arm.svg")])
+    assert run.exit_code == 0, run.output
+    drawn = (tmp_path / "arm.svg").read_text()
+    assert "limit of one for all joints" in drawn
+    assert "valid below" not in drawn
+
+
 def test_the_command_prints_a_table_json_and_figures(tmp_path: Path) -> None:
     run = CliRunner().invoke(app, ["design", "--figure", str(tmp_path / "limit.svg")])
     assert run.exit_code == 0, run.output
