@@ -40,7 +40,7 @@ _PHASES = ((0.0, 28.0), (28.0, 37.0), (37.0, math.inf))
 _LEFT_OUT = "omits the thesis' ground force"
 _PUSHES = f"walk with a payload, pushes of 10 N at 28 s (chest) and 37 s (left arm); {_LEFT_OUT}"
 FITTED = "fitted to the thesis' falls in MuJoCo"
-"""What the scenarios and claims with 45 % of the weight say of this size."""
+"""Remark on the size of 45 % of the weight, in the texts of scenarios and claims."""
 
 
 def _with_ground_force(name: str, percent: int) -> Scenario:

@@ -24,10 +24,9 @@ def half_point(survived: ArrayLike, grid: Sequence[float]) -> Estimate:
     """Estimate where survival crosses one half, with a bootstrap interval over seeds.
 
     Survival is made to fall from level to level (isotonic regression) and is linear in between; where it rises, see
-    `artde_gym.studies.frontier.result.rising_note`. Seeds are drawn anew
-    with all their levels, since these share a seed's disturbances. A sample says between which two levels it crosses,
-    so that the interval is never narrower than the grid: it runs from the 2.5 % quantile of the lower ones of those
-    levels to the 97.5 % quantile of the upper ones.
+    `artde_gym.studies.frontier.result.rising_note`. Seeds are drawn anew with all their levels, since these share a
+    seed's disturbances. A sample says between which two levels it crosses, so that the interval is never narrower than
+    the grid: it runs from the 2.5 % quantile of the lower ones of those levels to the 97.5 % one of the upper ones.
 
     Args:
         survived: (seeds, levels) 1 or 0; NaN for an episode that was not run.
@@ -46,7 +45,7 @@ def half_point(survived: ArrayLike, grid: Sequence[float]) -> Estimate:
     rates = np.nanmean(table, axis=0)
     if rates[0] < HALF < rates[-1]:
         return Estimate(math.nan, math.nan, math.nan, count)
-    value = _crossing(rates, grid)[0]
+    value = float(f"{_crossing(rates, grid)[0]:.10g}")  # without the noise of interpolation
     if count == 1:
         return Estimate(value, math.nan, math.nan, 1)
     brackets = _brackets(table, grid)
@@ -147,6 +146,6 @@ def _crossing(rates: Array, grid: Sequence[float]) -> tuple[float, float, float]
     last, first = int(np.flatnonzero(curve >= HALF)[-1]), int(np.flatnonzero(curve <= HALF)[0])
     if last >= first:  # it stays at one half from level to level
         outer = max(first - 1, 0), min(last + 1, len(grid) - 1)
-        return float(f"{(grid[first] + grid[last]) / 2:.10g}"), grid[outer[0]], grid[outer[1]]
+        return (grid[first] + grid[last]) / 2, grid[outer[0]], grid[outer[1]]
     share = (curve[last] - HALF) / (curve[last] - curve[first])
-    return float(f"{grid[last] + share * (grid[first] - grid[last]):.10g}"), grid[last], grid[first]
+    return grid[last] + share * (grid[first] - grid[last]), grid[last], grid[first]

@@ -110,14 +110,14 @@ class Design:
         """
         return {(world.number, name): self._point(world, name) for world in self.worlds for name in self.controllers}
 
-    def end_points(self) -> Iterator[tuple[str, SweepCell]]:
-        """Yield the first world with each factor at each end of its range, as each controller runs it, and its name."""
+    def end_points(self) -> Iterator[tuple[str, list[SweepCell]]]:
+        """Yield the first world with each factor at each end of its range: its name, and what each controller runs."""
         first = self.worlds[0]
         for factor in self.factors:
             for value in factor.ends:
                 world = dataclasses.replace(first, factors={**first.factors, factor.name: value})
-                for name in self.controllers:
-                    yield f"world 0 with factor {factor.name!r} at {value!r}", self._point(world, name)
+                points = [self._point(world, name) for name in self.controllers]
+                yield f"world 0 with factor {factor.name!r} at {value!r}", points
 
     def matched_point(self, number: int, gains: Mapping[str, float]) -> SweepCell:
         """Return the second pass in one world."""

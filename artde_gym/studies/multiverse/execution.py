@@ -21,7 +21,7 @@ from artde_gym.evaluation.tasks import Progress, Update, labels_of
 from artde_gym.evaluation.workers import check_picklable, check_workers, run_jobs
 from artde_gym.extras import require
 from artde_gym.studies.multiverse.design import MATCHED, Design, load
-from artde_gym.studies.multiverse.job import Job, Numbered, check_adaptive, check_point, check_points, jobs_of, run
+from artde_gym.studies.multiverse.job import Job, Numbered, check_adaptive, check_points, check_world, jobs_of, run
 from artde_gym.studies.multiverse.result import Multiverse, read_multiverse
 from artde_gym.studies.reproduce.reproduction import mean_gains
 from artde_gym.studies.sweep import parquet
@@ -117,8 +117,8 @@ def _check(
     if not store.done:  # a folder goes on whatever was allowed when it was begun
         if plan.matched is not None:
             check_adaptive(points[0, plan.matched], plan.vectorized)
-        for place, point in plan.end_points():
-            check_point(place, point, plan.vectorized)
+        for place, ends in plan.end_points():
+            check_world(place, ends, plan.vectorized)
     fresh = [(number, point) for (number, _), point in points.items() if (point.id, 0) not in store.done]
 
     def checked(job: Job, count: int) -> None:

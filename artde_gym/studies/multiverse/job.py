@@ -65,17 +65,17 @@ def check_points(points: Sequence[Numbered], vectorized: bool, on_checked: Calla
                 policy_for(point.spec, env, point.gains)
         except ArtdeGymError:
             for number, point in zip(job.task.episodes, job.points, strict=True):
-                check_point(f"world {number}", point, vectorized)
+                check_world(f"world {number}", [point], vectorized)
             raise
         count += len(job.points)
         on_checked(job, count)
 
 
-def check_point(place: str, point: SweepCell, vectorized: bool) -> tuple[Any, Policy]:
-    """Build one point: its environment and its controller; raises the errors of `check_points`, with the place."""
+def check_world(place: str, points: Sequence[SweepCell], vectorized: bool) -> tuple[Any, list[Policy]]:
+    """Build one world's environment and its controllers; raises the errors of `check_points`, with the place."""
     try:
-        env = validate_cell(vectorized, point.cell)
-        return env, policy_for(point.spec, env, point.gains)
+        env = validate_cell(vectorized, points[0].cell)
+        return env, [policy_for(point.spec, env, point.gains) for point in points]
     except ArtdeGymError as error:
         raise error.within(place) from error
 
@@ -86,7 +86,7 @@ def check_adaptive(point: SweepCell, vectorized: bool) -> None:
     Raises:
         OptionError: if it has none.
     """
-    env, policy = check_point(MATCHED, point, vectorized)
+    env, (policy,) = check_world(MATCHED, [point], vectorized)
     observation, _ = env.reset(seed=0)
     _, state = policy.predict(observation)
     diagnose = getattr(policy, "diagnostics", None)
